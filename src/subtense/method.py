@@ -1,0 +1,109 @@
+"""Method: one row of the METHODS table, and the reasons why a row may have no answer."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .distribution import Array
+from .quantity import Note
+
+
+class Reason(enum.IntEnum):
+    """Why a row has no answer; 0 where it has one. `FAR` reasons are approached by ever larger distances."""
+
+    OK = 0
+    ZERO_EXTENT = 1
+    BEHIND_CAMERA = 2
+    NOT_INVERTIBLE = 3
+    TOO_OBLIQUE = 4
+    NOT_CONVERGED = 5
+    NOT_PINHOLE = 6
+    OUT_OF_RANGE = 7
+
+    @property
+    def text(self) -> str:
+        """The sentence a person reads."""
+        return _REASONS[self][0]
+
+    @property
+    def far(self) -> bool:
+        """Whether the answer grows without limit on the way there, so that it counts as infinite in an interval."""
+        return _REASONS[self][1]
+
+
+_REASONS: dict[Reason, tuple[str, bool]] = {
+    Reason.OK: ("", False),
+    Reason.ZERO_EXTENT: ("the object has no extent in the picture: its two ends fall on one point", True),
+    Reason.BEHIND_CAMERA: ("the object would lie behind the camera", False),
+    Reason.NOT_INVERTIBLE: ("a point lies where the lens model gives no direction (its distortion folds back)", False),
+    Reason.TOO_OBLIQUE: ("no place of the object fits: it can't be tilted that much and look that long", False),
+    Reason.NOT_CONVERGED: ("no pose of the target fits the points", False),
+    Reason.NOT_PINHOLE: ("this method needs a perspective picture, and the camera's is a panorama", False),
+    Reason.OUT_OF_RANGE: ("an input left the range it has a meaning in (a length, a focal length of 0 or below)", True),
+}
+
+Reasons = npt.NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class Output:
+    """One number a method gives: the field of its result, what it is, its unit, and the name people read."""
+
+    name: str
+    what: str
+    unit: str
+    title: str
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to measure.
+
+    Attributes:
+        name: the key in METHODS, as on the command line.
+        title: a few words.
+        inputs: the frozen dataclass whose fields are nouns.
+        outputs: the numbers it gives, headline first.
+        function: Inputs to a frozen result with an array per output and `reason`; pure, broadcasting, without sigma.
+        assumes: what must hold for the interval to hold, one sentence each.
+        source: where the relation is published.
+        typical: its usual relative error, in words.
+        example: makes Inputs for documentation and contract tests.
+        start: for estimators, the nominal solution that `function` refines (its second argument).
+        derivative: partial derivatives by (field, part key): {output: {(field, key): (k, ...)}}; None where it has none.
+        notes: doubts that follow from the inputs and the nominal result.
+        vectorised: False for engines that take one scene at a time.
+    """
+
+    name: str
+    title: str
+    inputs: type
+    outputs: tuple[Output, ...]
+    function: Callable[..., Any]
+    assumes: tuple[str, ...]
+    source: str
+    typical: str
+    example: Callable[[], Any]
+    start: Callable[[Any], Any] | None = None
+    derivative: Callable[[Any, Any], Mapping[str, Mapping[tuple[str, str], Array]] | None] | None = None
+    notes: Callable[[Any, Any], tuple[Note, ...]] = field(default=lambda inputs, result: ())
+    vectorised: bool = True
+
+    @property
+    def needs(self) -> str:
+        """The first paragraph of the inputs' documentation."""
+        return (self.inputs.__doc__ or "").strip().split("\n\n")[0]
+
+
+def reasons(shape: tuple[int, ...], *conditions: tuple[npt.NDArray[np.bool_], Reason]) -> Reasons:
+    """(shape) the first reason whose condition holds, OK elsewhere."""
+    code = np.zeros(shape, np.int8)
+    for where, reason in reversed(conditions):
+        code[np.broadcast_to(where, shape)] = reason
+    return code

@@ -1,0 +1,1 @@
+"""Ways to get a Measurement, one per file. The table is `subtense.workflow.METHODS`."""
