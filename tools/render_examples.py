@@ -11,6 +11,7 @@ deterministic: all seeds are fixed.
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import sys
 import time
@@ -29,6 +30,7 @@ DEPTH_UNIT_M = 1e-4
 NAMES = ("desk", "belt", "street", "stereo", "facade")
 
 
+@functools.cache
 def shots_of(name: str) -> list[Shot]:
     """The shots of one example."""
     made = getattr(render_scenes, name)()
@@ -36,7 +38,7 @@ def shots_of(name: str) -> list[Shot]:
 
 
 def tame_sparks(picture: np.ndarray) -> np.ndarray:
-    """Limit isolated Monte Carlo sparks to twice the brightest of their 5 x 5 ring median."""
+    """Limit isolated Monte Carlo sparks to 2.5 times the median of their 5 x 5 neighbours."""
     luminance = picture @ np.array([0.2126, 0.7152, 0.0722], np.float32)
     limit = 2.5 * cv2.medianBlur(np.ascontiguousarray(luminance, np.float32), 5) + 0.15
     factor = np.minimum(1, limit / np.maximum(luminance, 1e-6))

@@ -77,7 +77,7 @@ def desk() -> Shot:
         look_at(centre, target, 0.6), centre,
     )  # fmt: skip
     nominal = Nominal("Phone 26", 5.65, 7.53, 5.65)
-    return Shot("desk.jpg", scene, camera, nominal, 0.62, 1, things)
+    return Shot("desk.jpg", scene, camera, nominal, 1.03, 1, things)
 
 
 def desk_objects(scene: rs.Scene) -> list[Thing]:
@@ -182,7 +182,7 @@ def belt() -> Shot:
     )
     things = [belt_package(x0, x1, y0, y1, z)]
     nominal = Nominal("Belt 12", 12.0, 7.2, 5.4, focal_plane_resolution=True)
-    return Shot("belt.jpg", scene, camera, nominal, 0.62, 2, things)
+    return Shot("belt.jpg", scene, camera, nominal, 1.10, 2, things)
 
 
 def belt_package(x0: float, x1: float, y0: float, y1: float, z: float) -> Thing:
@@ -204,7 +204,7 @@ def street() -> Shot:
     """A person at 8 m on a crossing and a van at 14 m."""
     scene = rs.Scene()
     scene.add(rs.sky_light(tx.sky(70), 0.62))
-    scene.add(rs.sun((-0.75, -0.55, 0.85), (2.6, 2.4, 2.05)))
+    scene.add(rs.sun((-0.42, -0.85, 0.80), (2.6, 2.4, 2.05)))
     street_ground(scene)
     street_houses(scene)
     street_green(scene)
@@ -217,7 +217,7 @@ def street() -> Shot:
         look_at(centre, target, -0.3), centre,
     )  # fmt: skip
     nominal = Nominal("Cam 24", 24.0, 23.5, 15.67)
-    return Shot("street.jpg", scene, camera, nominal, 0.66, 3, [person, *van])
+    return Shot("street.jpg", scene, camera, nominal, 1.15, 3, [person, *van])
 
 
 def street_ground(scene: rs.Scene) -> None:
@@ -265,20 +265,14 @@ def street_houses(scene: rs.Scene) -> None:
 
 def street_green(scene: rs.Scene) -> None:
     """Trees on the pavements and lamp posts."""
-    rng = np.random.default_rng(76)
     bark, iron = rs.matte(tx.rgb("5b4a3a")), rs.glossy(tx.rgb("2f3a38"), 0.3)
     greens = [rs.matte(tx.rgb(c)) for c in ("4f6d2f", "5f7d38", "6f8c42", "43602a")]
     spots = [(-4.3, 21), (-4.3, 33), (4.3, 27), (4.3, 40), (-4.3, 47), (4.3, 55), (-4.3, 62)]
     spots += [(-9, 95), (-3, 104), (5, 98), (11, 106), (0, 110), (-14, 108)]
     for x, y in spots:
         scene.add(rs.tube([(x, y, 0), (x + 0.05, y, 1.3), (x, y, 2.8)], [0.13, 0.10, 0.08], bark))
-        for _ in range(150):
-            offset = rng.normal(size=3)
-            offset *= rng.uniform(0.45, 1.0) ** 0.5 / np.linalg.norm(offset)
-            centre = np.array([x, y, 4.0]) + offset * [1.35, 1.35, 1.55]
-            scene.add({"type": "sphere", "center": list(centre),
-                       "radius": float(rng.uniform(0.16, 0.34)),
-                       "bsdf": greens[int(rng.integers(4))]})  # fmt: skip
+        crown = rs.foliage((x, y, 3.9), (1.35, 1.35, 1.5), 5200, 0.19, greens, 1000 + int(x * 7 + y * 31))
+        add_all(scene, crown)
     for x, y in ((3.65, 17.5), (-3.65, 28.0), (3.65, 45.0)):
         scene.add(rs.tube([(x, y, 0.1), (x, y, 2.5), (x, y, 4.6)], [0.06, 0.045, 0.04], iron))
         scene.add(rs.ellipsoid((x, y, 4.75), (0.16, 0.16, 0.22), rs.glossy(0.75, 0.1)))
@@ -300,16 +294,16 @@ def add_person(scene: rs.Scene, at: np.ndarray) -> Thing:
               (0.93, 0.088 * s, 0, 0.088, 0.10)], trousers)  # fmt: skip
         loft([(0.0, 0.115 * s, -0.045, 0.045, 0.130), (0.03, 0.115 * s, -0.045, 0.049, 0.134),
               (0.065, 0.113 * s, -0.03, 0.045, 0.105), (0.10, 0.11 * s, 0, 0.045, 0.06)], shoes)
-        arm = [at + p for p in np.array([(0.175 * s, 0, 1.405), (0.225 * s, 0.01, 1.27),
-                                         (0.255 * s, 0.02, 1.10), (0.265 * s, -0.03, 0.88)])]
-        scene.add(rs.tube(arm, [0.062, 0.054, 0.047, 0.038], coat))
-        hand = at + np.array([0.266 * s, -0.045, 0.80])
+        arm = [at + p for p in np.array([(0.165 * s, 0, 1.395), (0.208 * s, 0.01, 1.26),
+                                         (0.230 * s, 0.02, 1.10), (0.242 * s, -0.03, 0.88)])]
+        scene.add(rs.tube(arm, [0.053, 0.052, 0.046, 0.038], coat))
+        hand = at + np.array([0.243 * s, -0.045, 0.80])
         scene.add(rs.ellipsoid(hand, (0.030, 0.045, 0.078), skin))
         scene.add(rs.ellipsoid(at + [0.075 * s, 0.005, 1.625], (0.018, 0.025, 0.034), skin))
         scene.add(rs.ellipsoid(at + [0.030 * s, -0.086, 1.645], (0.010, 0.008, 0.006),
                                rs.matte(0.03)))  # fmt: skip
-    loft([(0.82, 0, 0, 0.165, 0.118), (0.93, 0, 0, 0.172, 0.122), (1.08, 0, 0, 0.158, 0.112),
-          (1.22, 0, 0, 0.178, 0.120), (1.34, 0, 0, 0.196, 0.118), (1.42, 0, 0, 0.178, 0.100),
+    loft([(0.80, 0, 0, 0.192, 0.132), (0.92, 0, 0, 0.184, 0.126), (1.07, 0, 0, 0.166, 0.114),
+          (1.22, 0, 0, 0.176, 0.118), (1.34, 0, 0, 0.186, 0.114), (1.42, 0, 0, 0.178, 0.100),
           (1.47, 0, 0, 0.105, 0.075), (1.495, 0, 0, 0.062, 0.060)], coat)  # fmt: skip
     scene.add(rs.ellipsoid(at + [0, -0.062, 1.40], (0.045, 0.05, 0.085), shirt))
     scene.add(rs.tube([at + [0, 0.01, 1.44], at + [0, 0.005, 1.50], at + [0, 0, 1.56]],
@@ -379,7 +373,7 @@ def stereo() -> tuple[Shot, Shot]:
     scene.add(rs.area_light((-0.9, 1.2, 2.9), (0.1, 1.9, 0.6), 1.8, 1.4, (8.0, 7.6, 7.0)))
     scene.add({"type": "constant", "radiance": rs.colour((0.50, 0.52, 0.56))})
     centre = np.array([0.0, 0.0, 1.30])
-    left_rotation = rotation_x(-12.0) @ look_at((0, 0, 0), (0, 1, 0))
+    left_rotation = rotation_x(12.0) @ look_at((0, 0, 0), (0, 1, 0))
     right_rotation = rotation_x(0.08) @ rotation_y(-0.12) @ rotation_z(0.05) @ left_rotation
     inner = (1600, 1200, 1789.6, 805.3, 594.8, (-0.055, 0.042, 0.0002, -0.0003, 0.0))
     left = Camera(*inner, left_rotation, centre)
@@ -387,8 +381,8 @@ def stereo() -> tuple[Shot, Shot]:
     nominal = Nominal("Stereo 8", 8.0, 7.2, 5.4)
     note = "right camera centre is at (0.120, 0, 0) m in left camera axes"
     return (
-        Shot("stereo_left.jpg", scene, left, nominal, 0.6, 4, notes=note),
-        Shot("stereo_right.jpg", scene, right, nominal, 0.6, 5, notes=note),
+        Shot("stereo_left.jpg", scene, left, nominal, 0.95, 4, notes=note),
+        Shot("stereo_right.jpg", scene, right, nominal, 0.95, 5, notes=note),
     )
 
 
@@ -475,7 +469,7 @@ def facade() -> Shot:
         look_at(centre, target, 0.4), centre,
     )  # fmt: skip
     nominal = Nominal("Cam 18", 18.0, 15.67, 23.5)
-    return Shot("facade.jpg", scene, camera, nominal, 0.66, 6, things, orientation=6)
+    return Shot("facade.jpg", scene, camera, nominal, 1.15, 6, things, orientation=6)
 
 
 def openings() -> list[tuple[str, float, float, float, float]]:
@@ -494,14 +488,7 @@ def openings() -> list[tuple[str, float, float, float, float]]:
 def add_facade(scene: rs.Scene) -> list[Thing]:
     """Brick wall in the plane y = 0 with real openings; returns the measured ones."""
     holes = openings()
-    brick = tx.bricks(60, 20, 201)
-    xs = sorted({-9.0, 13.5, *(x for h in holes for x in h[1:3])})
-    zs = sorted({0.0, 11.3, *(z for h in holes for z in h[3:5])})
-    for x0, x1 in zip(xs[:-1], xs[1:], strict=True):
-        for z0, z1 in zip(zs[:-1], zs[1:], strict=True):
-            mx, mz = (x0 + x1) / 2, (z0 + z1) / 2
-            if not any(a < mx < b and c < mz < d for _, a, b, c, d in holes):
-                scene.add(wall_piece(brick, x0, x1, z0, z1))
+    add_wall(scene, holes)
     for index, hole in enumerate(holes):
         add_opening(scene, index, hole)
     band = rs.matte(rs.image(tx.mottled((64, 2048), "cfc6b4", (2, 40), 203, 0.05)))
@@ -511,20 +498,34 @@ def add_facade(scene: rs.Scene) -> list[Thing]:
     return [opening_thing(hole) for name in shown for hole in holes if hole[0] == name]
 
 
-def wall_piece(brick: np.ndarray, x0: float, x1: float, z0: float, z1: float) -> dict:
-    """Part of the wall, brick pattern continuous over the whole facade (4.8 m period)."""
-    texture = rs.image(brick, (1, 1))
-    sx, sz = (x1 - x0) / 4.8, (z1 - z0) / 4.8
-    shift = rs.Transform().translate([x0 / 4.8, -z1 / 4.8, 0])
-    texture["to_uv"] = shift @ rs.Transform().scale([sx, sz, 1])
-    return rs.panel((x0, 0, z1), (x1, 0, z1), (x0, 0, z0), rs.matte(texture))
+def add_wall(scene: rs.Scene, holes, band: float = 0.12) -> None:
+    """The wall cut along the openings; a light stone band surrounds each of them."""
+    grown = [(a - band, b + band, c - band, d + band) for _, a, b, c, d in holes]
+    xs = sorted({-9.0, 13.5, *(x for _, a, b, _, _ in holes for x in (a - band, a, b, b + band))})
+    zs = sorted({0.0, 11.3, *(z for *_, c, d in holes for z in (c - band, c, d, d + band))})
+    brick, stone = [], []
+    for x0, x1 in zip(xs[:-1], xs[1:], strict=True):
+        for z0, z1 in zip(zs[:-1], zs[1:], strict=True):
+            mx, mz = (x0 + x1) / 2, (z0 + z1) / 2
+            if any(a < mx < b and c < mz < d for _, a, b, c, d in holes):
+                continue
+            framed = any(a < mx < b and c < mz < d for a, b, c, d in grown)
+            piece = [(x0, 0, z0), (x1, 0, z0), (x1, 0, z1), (x0, 0, z1)]
+            (stone if framed else brick).append(piece)
+    for pieces, picture, period in (
+        (brick, tx.bricks(60, 20, 201), 4.8),
+        (stone, tx.mottled((1024, 1024), "dcd6c8", (12, 12), 202, 0.04), 3.0),
+    ):
+        corners = np.array(pieces, float)
+        material = rs.matte(rs.image(picture, (1, 1)))
+        scene.add(rs.quads(corners, material, corners[..., [0, 2]] / period))
 
 
 def add_opening(scene: rs.Scene, index: int, hole) -> None:
-    """Light reveals, frame and glass (or the door leaf) behind an opening."""
+    """Dark reveals, frame and glass (or the door leaf) behind an opening."""
     name, x0, x1, z0, z1 = hole
     depth = 0.14
-    reveal = rs.matte(tx.rgb("e4ded0"))
+    reveal = rs.matte(tx.rgb("1f4a3c" if name == "door" else "3a3d40"))
     corners = [(x0, z1), (x1, z1), (x1, z0), (x0, z0)]
     for (ax, az), (bx, bz) in zip(corners, corners[1:] + corners[:1], strict=True):
         scene.add(rs.panel((ax, 0, az), (bx, 0, bz), (ax, depth, az), reveal))
@@ -536,17 +537,15 @@ def add_opening(scene: rs.Scene, index: int, hole) -> None:
     rng = np.random.default_rng(300 + index)
     if rng.uniform() < 0.6:
         drop = int(rng.integers(12, 40))
-        picture[:drop] = rng.uniform(0.25, 0.45)
-    if rng.uniform() < 0.5:
-        picture[:, :12] = picture[:, -12:] = 0.35
+        picture[:drop] = rng.uniform(0.12, 0.26)
     pane = rs.glass_front(rs.image(picture))
     scene.add(rs.panel((x0, depth, z1), (x1, depth, z1), (x0, depth, z0), pane))
-    white, t, y = rs.matte(0.72), 0.06, depth - 0.04
+    bar, t, y = rs.matte(tx.rgb("3a3d40")), 0.06, depth - 0.04
     middle, cross = (x0 + x1) / 2, z0 + 1.0
     bars = [(x0, x0 + t, z0, z1), (x1 - t, x1, z0, z1), (x0, x1, z0, z0 + t), (x0, x1, z1 - t, z1),
             (middle - 0.03, middle + 0.03, z0, z1), (x0, x1, cross - 0.025, cross + 0.025)]
     for a, b, c, d in bars:
-        add_all(scene, rs.box((a, y, c), (b, depth, d), {}, white))
+        add_all(scene, rs.box((a, y, c), (b, depth, d), {}, bar))
 
 
 def add_door_leaf(scene: rs.Scene, x0, x1, z0, z1, depth: float) -> None:
@@ -585,9 +584,6 @@ def facade_ground(scene: rs.Scene) -> None:
     for x in (-1.35, 1.35):
         pot = [(0.14, 0.0), (0.16, 0.02), (0.21, 0.40), (0.20, 0.42), (0.18, 0.38)]
         scene.add(rs.lathe((x, -0.45, 0.001), pot, rs.matte(tx.rgb("a8603f"))))
-        rng = np.random.default_rng(208)
-        for _ in range(90):
-            offset = rng.normal(size=3) * [0.11, 0.11, 0.12]
-            scene.add({"type": "sphere", "center": [x + offset[0], -0.45 + offset[1],
-                                                    0.62 + offset[2]],
-                       "radius": 0.06, "bsdf": rs.matte(tx.rgb("4f7038"))})  # fmt: skip
+        leaves = [rs.matte(tx.rgb(c)) for c in ("4f7038", "648a45", "7a9a55")]
+        add_all(scene, rs.foliage((x, -0.45, 0.66), (0.25, 0.25, 0.27), 900, 0.08, leaves,
+                                  208 + int(x)))  # fmt: skip

@@ -60,7 +60,8 @@ def colour(value) -> dict:
 
 def image(picture: np.ndarray, repeat: tuple[float, float] | None = None) -> dict:
     """Bitmap texture of linear reflectance, optionally repeated (u, v) times."""
-    data = mi.Bitmap(np.ascontiguousarray(picture, np.float32))
+    # Mitsuba puts the first row at v = 0, the lower side; pictures start at the upper side.
+    data = mi.Bitmap(np.ascontiguousarray(picture[::-1], np.float32))
     out = {"type": "bitmap", "bitmap": data, "raw": True, "wrap_mode": "clamp"}
     if repeat:
         out["wrap_mode"] = "repeat"
@@ -255,6 +256,32 @@ def rounded_card(centre, yaw_deg: float, size, radius: float, thick: float, mate
     corners = np.column_stack([sharp, np.full(4, thick)]) @ turn.T + centre
     body = mesh(local @ turn.T + centre, np.concatenate(faces), material, False, uv)
     return body, corners
+
+
+def quads(corners: np.ndarray, material, uv: np.ndarray | None = None):
+    """One mesh of many quadrilaterals (N, 4, 3), with optional texture coordinates."""
+    count = len(corners)
+    first = 4 * np.arange(count)[:, None]
+    faces = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]])
+    flat_uv = None if uv is None else uv.reshape(-1, 2)
+    return mesh(corners.reshape(-1, 3), faces, material, False, flat_uv)
+
+
+def foliage(centre, radii, count: int, leaf: float, materials: list[dict], seed: int) -> list:
+    """Crown of randomly turned leaves gathered in clumps, one mesh per material."""
+    rng = np.random.default_rng(seed)
+    clumps = rng.normal(size=(28, 3))
+    clumps *= rng.uniform(0.35, 1.0, (28, 1)) ** 0.5 / np.linalg.norm(clumps, axis=1)[:, None]
+    out = []
+    for material in materials:
+        n = count // len(materials)
+        spread = rng.normal(size=(n, 3)) * 0.17
+        middle = centre + (clumps[rng.integers(28, size=n)] + spread) * radii
+        axes = np.linalg.qr(rng.normal(size=(n, 3, 3)))[0]
+        a, b = axes[:, :, 0] * leaf / 2, axes[:, :, 1] * leaf / 3
+        corners = np.stack([middle - a, middle - b, middle + a, middle + b], axis=1)
+        out.append(quads(corners, material))
+    return out
 
 
 def area_light(centre, target, width: float, height: float, radiance) -> dict:

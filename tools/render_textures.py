@@ -122,14 +122,14 @@ def bank_card() -> np.ndarray:
     w, h = 1712, 1080
     v, u = np.mgrid[:h, :w]
     wave = 0.5 + 0.5 * np.sin(u / 260 + 1.3 * np.sin(v / 300))
-    base = mix(rgb("12386e"), rgb("2b76b8"), 0.25 + 0.5 * u / w + 0.2 * (wave - 0.5))
+    base = mix(rgb("dfe5ea"), rgb("9fc3dd"), 0.15 + 0.5 * u / w + 0.2 * (wave - 0.5))
     image = Image.new("L", (w, h), 0)
     draw = ImageDraw.Draw(image)
     draw.text((110, 90), "SPECIMEN BANK", font=font(110), fill=255)
     draw.text((110, 640), "0000 0000 0000 0000", font=font(140), fill=255)
     draw.text((110, 870), "A. SAMPLE", font=font(85), fill=255)
     draw.text((1180, 870), "12/30", font=font(85), fill=255)
-    base = mix(base, rgb("e8edf5"), np.asarray(image) / 255)
+    base = mix(base, rgb("1b3358"), np.asarray(image) / 255)
     return draw_chip(base)
 
 

@@ -29,7 +29,11 @@ CHUNK = 8192
 """Rows or draws evaluated at once: small enough for the caches of one core."""
 BLOCK = 10_000
 """Draws of one block of the adaptive procedure (JCGM 101, 7.9.4)."""
+FEWEST_BLOCKS = 10
+"""Two blocks can agree by chance: their scatter says nothing yet."""
 MOST_DRAWS = 1_000_000
+NEARLY_NORMAL = 0.4
+"""Excess kurtosis up to which Cornish and Fisher's expansion is trusted: a uniform input may make half the variance."""
 PAIRS_UP_TO = 24
 """Variables among which all mixed second differences are taken; beyond it only those that matter most."""
 
@@ -61,6 +65,7 @@ class Propagated:
         u_second_order: (o,) u with the second-order terms of GUM 5.1.2 (quadratic response); None for rows.
         bend: (o, ...) how far an interval end is expected to be off, in u.
         reason: (...) codes of `Reason`.
+        quadratic: u and interval of each output from the quadratic response; empty for rows.
     """
 
     names: tuple[str, ...]
@@ -75,6 +80,7 @@ class Propagated:
     u_second_order: Array | None
     bend: Array
     reason: npt.NDArray[np.int8]
+    quadratic: tuple[_Bent, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -213,9 +219,10 @@ def _scene(model: Model, space: Space, level: float) -> Propagated:
     u2 = np.sqrt(u**2 + np.sum(hessian**2, axis=(1, 2)) / 2)
     dof = _effective_dof(u, contributions, np.array([line.dof for line in space.lines]))
     k = np.array([_coverage_factor(level, float(d)) for d in dof])
-    bend = np.array([_bend(s[o], hessian[o], space.lines, level) for o in range(len(u))]) if m else np.zeros(len(u))
+    bent = [_quadratic(s[o], hessian[o], space.lines, level) for o in range(len(u))]
     return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, y0 - k * u, y0 + k * u, dof,
-                      contributions, s @ s.T, u2, bend, np.asarray(reason[0]))  # fmt: skip
+                      contributions, s @ s.T, u2, np.array([b.bend for b in bent]), np.asarray(reason[0]),
+                      tuple(bent))  # fmt: skip
 
 
 def _offsets(m: int, pairs: Sequence[tuple[int, int]]) -> Array:
@@ -293,20 +300,55 @@ def _coverage_factor(level: float, dof: float) -> float:
     return t_quantile(0.5 + level / 2, whole)
 
 
-def _bend(s: Array, hessian: Array, lines: Sequence[Line], level: float) -> float:
-    """Expected error of a first-order interval end, in u: shift, skewness and kurtosis by Cornish and Fisher."""
+@dataclass(frozen=True)
+class _Bent:
+    """What the quadratic response says of one output.
+
+    Attributes:
+        u: standard deviation.
+        low: lower interval limit, as offset from the nominal value.
+        high: upper interval limit, likewise.
+        bend: the largest distance of these limits from the first-order ones, in first-order u.
+        excess: kurtosis less 3, from the laws of the inputs.
+        active: the variables that move the output at all.
+    """
+
+    u: float
+    low: float
+    high: float
+    bend: float
+    excess: float = 0.0
+    active: tuple[int, ...] = ()
+
+
+def _quadratic(s: Array, hessian: Array, lines: Sequence[Line], level: float) -> _Bent:
+    """Moments of the quadratic response, and its interval by Cornish and Fisher's expansion.
+
+    Source: P. Hall, The Bootstrap and Edgeworth Expansion, 2.5.
+    """
     u = float(np.sqrt(np.sum(s**2)))
-    if not np.all(np.isfinite(s)) or not np.all(np.isfinite(hessian)):
-        return math.inf
+    active = tuple(int(i) for i in np.flatnonzero((abs(s) > 1e-6 * u) | np.any(hessian, axis=0)))
+    if not np.all(np.isfinite(s)) or not np.all(np.isfinite(hessian)) or (u == 0 and np.any(hessian)):
+        return _Bent(u, -math.inf, math.inf, math.inf, active=active)
     if u == 0:
-        return math.inf if np.any(hessian) else 0.0
+        return _Bent(0.0, 0.0, 0.0, 0.0)
     laws = [law for line in lines for law in line.laws]
+    means = np.array([law.mean for law in laws])
+    kurtosis = np.array([0.0 if law.name == "t" else law.excess_kurtosis for law in laws])
+    centred = s**2 * (1 - means**2)
+    mean = float(np.trace(hessian)) / 2 + float(s @ means)
+    variance = float(np.sum(centred) + np.sum(hessian**2) / 2)
+    skew = float(3 * s @ hessian @ s + np.trace(hessian @ hessian @ hessian)) / variance**1.5
+    excess = float(np.sum(centred**2 * kurtosis)) / variance**2
     z = normal_quantile(0.5 + level / 2)
-    kurtosis = sum(x**4 * law.excess_kurtosis for x, law in zip(s / u, laws, strict=True) if law.name != "t")
-    shift = float(np.trace(hessian)) / 2 + sum(x * law.mean for x, law in zip(s, laws, strict=True))
-    skew = (3 * s @ hessian @ s + np.trace(hessian @ hessian @ hessian)) / u**3
-    wider = math.sqrt(u**2 + float(np.sum(hessian**2)) / 2) / u - 1
-    return float(abs(shift) / u + abs(skew) * (z * z - 1) / 6 + abs(kurtosis) * abs(z**3 - 3 * z) / 24 + z * wider)
+    spread = math.sqrt(variance)
+    low, high = (mean + spread * _cornish_fisher(x, skew, excess) for x in (-z, z))
+    return _Bent(spread, low, high, max(abs(low + z * u), abs(high - z * u)) / u, excess, active)
+
+
+def _cornish_fisher(z: float, skew: float, excess: float) -> float:
+    """Quantile of a standardised law near the normal one."""
+    return z + (z * z - 1) * skew / 6 + (z**3 - 3 * z) * excess / 24 - (2 * z**3 - 5 * z) * skew**2 / 36
 
 
 # -- rows --------------------------------------------------------------------------------------------------
@@ -450,17 +492,19 @@ def monte_carlo(
     return _adaptive(model_of(method, inputs), space, level, seed)
 
 
-def _adaptive(model: Model, space: Space, level: float, seed: int) -> Draws:
+def _adaptive(model: Model, space: Space, level: float, seed: int, wanted: Sequence[int] | None = None) -> Draws:
+    """Blocks of draws until the statistics of the wanted outputs (all by default) are steady."""
+    outputs = list(range(len(model.names)) if wanted is None else wanted)
     rng = np.random.default_rng(seed)
     blocks: list[Draws] = []
     statistics: list[Array] = []
     while True:
         block = _sample(model, space, BLOCK, rng)
         blocks.append(block)
-        ends = np.array([block.interval(o, level) for o in range(len(model.names))])
-        with np.errstate(invalid="ignore"):
-            statistics.append(np.stack([block.mean, block.u, ends[:, 0], ends[:, 1]]))
-        stable = len(blocks) > 1 and _steady(np.stack(statistics))
+        ends = np.array([block.interval(o, level) for o in outputs])
+        chosen = Draws(block.names, block.values[outputs], block.reason)
+        statistics.append(np.stack([chosen.mean, chosen.u, ends[:, 0], ends[:, 1]]))
+        stable = len(blocks) >= FEWEST_BLOCKS and _steady(np.stack(statistics))
         if stable or len(blocks) * BLOCK >= MOST_DRAWS:
             values = np.concatenate([b.values for b in blocks], axis=1)
             return Draws(model.names, values, np.concatenate([b.reason for b in blocks]), stable)
@@ -504,16 +548,15 @@ def measure(
         raise GeometryError(reason.text, code=reason.name.lower())
     result = method.function(inputs, *((method.start(inputs),) if method.start else ()))
     notes = method.notes(inputs, result)
-    answers = [_mapped(model, space, nominal, o, level) for o in range(len(method.outputs))]
-    bent = [a is None and nominal.bend[o] * nominal.u[o] > _tolerance(float(nominal.u[o])) or
-            (a is None and nominal.bend[o] > 0 and nominal.u[o] == 0) for o, a in enumerate(answers)]  # fmt: skip
-    draws = _adaptive(model, space, level, seed) if any(bent) else None
+    answers = [_without_draws(model, space, nominal, o, level) for o in range(len(method.outputs))]
+    bent = [o for o, answer in enumerate(answers) if answer is None]
+    draws = _adaptive(model, space, level, seed, bent) if bent else None
     found = []
     for o, output in enumerate(method.outputs):
-        if draws is not None and bent[o]:
+        answer = answers[o]
+        if answer is None:
+            assert draws is not None
             answer = _drawn(draws, o, level, output)
-        else:
-            answer = answers[o] or _Answer(float(nominal.u[o]), float(nominal.low[o]), float(nominal.high[o]))
         found.append(_measurement(method, output, nominal, o, answer, space, level, label, notes, given or {}))
     return tuple(found)
 
@@ -529,21 +572,37 @@ class _Answer:
     notes: tuple[Note, ...] = ()
 
 
-def _mapped(model: Model, space: Space, nominal: Propagated, output: int, level: float) -> _Answer | None:
-    """The interval of a single uncertain input taken through a monotone response; None where that is not the case."""
-    if nominal.bend[output] * nominal.u[output] <= _tolerance(float(nominal.u[output])):
-        return None
-    if len(space.lines) != 1 or space.lines[0].count != 1:
-        return None
-    law = space.lines[0].laws[0]
-    shares = np.linspace((1 - level) / 2, (1 + level) / 2, 33)
-    z = np.array([[law.quantile(float(p)) for p in shares]])
-    values = _evaluate_at(model, space, z)[0][output]
+def _without_draws(model: Model, space: Space, nominal: Propagated, o: int, level: float) -> _Answer | None:
+    """The answer of the cheapest evaluation that keeps the tolerance of JCGM 101, 8.2; None where draws are needed."""
+    u, bend = float(nominal.u[o]), float(nominal.bend[o])
+    tolerance = _tolerance(u) / u if u > 0 else 0.0
+    if bend <= tolerance:
+        return _Answer(u, float(nominal.low[o]), float(nominal.high[o]))
+    quadratic, value = nominal.quadratic[o], float(nominal.value[o])
+    if len(quadratic.active) == 1:
+        mapped = _mapped(model, space, o, quadratic.active[0], level)
+        if mapped:
+            return mapped
+    # what the quadratic response leaves out is of the next order, and the expansion is for nearly normal sums
+    if bend**2 <= tolerance and abs(quadratic.excess) < NEARLY_NORMAL and math.isinf(float(nominal.dof[o])):
+        return _Answer(quadratic.u, value + quadratic.low, value + quadratic.high, "second order")
+    return None
+
+
+def _mapped(model: Model, space: Space, output: int, variable: int, level: float) -> _Answer | None:
+    """The interval of the single uncertain input taken through a monotone response; None where it is not monotone."""
+    laws = [law for line in space.lines for law in line.laws]
+
+    def through(shares: Array) -> Array:
+        z = np.zeros((len(laws), len(shares)))
+        z[variable] = [laws[variable].quantile(float(share)) for share in shares]
+        return _evaluate_at(model, space, z)[0][output]
+
+    values = through(np.linspace((1 - level) / 2, (1 + level) / 2, 33))
     step = np.diff(values)
     if not np.all(np.isfinite(values)) or not (np.all(step > 0) or np.all(step < 0)):
         return None
-    middle = np.linspace(0.0005, 0.9995, 1000)
-    spread = _evaluate_at(model, space, np.array([[law.quantile(float(p)) for p in middle]]))[0][output]
+    spread = through(np.linspace(0.0005, 0.9995, 1000))
     u = float(np.std(spread)) if np.all(np.isfinite(spread)) else None
     return _Answer(u, float(values.min()), float(values.max()), "mapped through the one uncertain input")
 

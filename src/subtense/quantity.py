@@ -347,7 +347,7 @@ class Measurement:
         unit: m, px, rad or 1.
         method: the key of METHODS that gave it.
         label: which thing was measured, where there are several.
-        evaluation: "first order", "mapped" (one monotone input) or "Monte Carlo, n draws".
+        evaluation: "first order", "second order", "mapped through the one uncertain input" or "Monte Carlo, n draws".
         budget: what u consists of, largest share first.
         notes: doubts.
         improve: what would improve it most, in one sentence.

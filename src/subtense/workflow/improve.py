@@ -1,0 +1,45 @@
+"""What would improve a measurement most, from the largest line of its budget."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from ..quantity import Measurement
+from ..reports.rounding import digits_for, fitting_unit, grouped
+
+CURES = (
+    ("focal length", "calibrate the camera at this focus (a board of 20 pictures), or measure one known distance"),
+    ("pixel aspect", "calibrate the camera"),
+    ("principal point", "calibrate the camera, or keep the object near the middle of the picture"),
+    ("lens distortion", "calibrate the camera, or keep the object near the middle of the picture"),
+    ("sensor width", "look up the sensor's width to two decimals, or calibrate the camera"),
+    ("image width", "state the picture's own width in pixels"),
+    ("pixel", "come closer or use a longer lens, so that the object is larger in the picture"),
+    ("extent", "come closer or use a longer lens, or measure its ends to a tenth of a pixel"),
+    ("size", "measure the object itself with a calliper or a tape and state its ±"),
+    ("distance", "measure the distance with a tape or a laser and state its ±"),
+    ("tilt", "turn the object to face the camera and state its tilt, or use a target with four known points"),
+    ("focus", "calibrate the camera at this focus"),
+    ("interaction", "lessen the largest of the other lines: the response bends"),
+)
+"""A word of a budget line's name, and what lessens that line; the first that fits is taken."""
+
+
+def improve(m: Measurement) -> str:
+    """One sentence: the largest line, what u would be without it, and what lessens it; empty where there is no budget."""
+    if not m.budget or m.u is None:
+        return ""
+    top = m.budget[0]
+    cure = next((cure for word, cure in CURES if word in top.name), "state it more closely")
+    name, factor = fitting_unit(m.value, m.unit)
+    rest = m.u * math.sqrt(max(1 - top.share, 0.0)) / factor
+    now = m.u / factor
+    less = f"{grouped(rest, max(digits_for(rest), 0))}" if rest > 1e-4 * now else "next to 0"
+    saving = f"without it u would be {less} instead of {grouped(now, max(digits_for(now), 0))} {name}"
+    return f"{top.name} makes {100 * top.share:.0f} % of the variance ({saving}): {cure}."
+
+
+def improved(measurements: tuple[Measurement, ...]) -> tuple[Measurement, ...]:
+    """The measurements with `improve` filled in."""
+    return tuple(dataclasses.replace(m, improve=improve(m)) for m in measurements)
