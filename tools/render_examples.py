@@ -53,10 +53,10 @@ def render_linear(shot: Shot, samples: int, oversampling: float) -> np.ndarray:
     return resample(tame_sparks(source), pinhole, shot.camera)
 
 
-def take(shot: Shot, folder: Path, samples: int, oversampling: float) -> None:
+def take(shot: Shot, folder: Path, samples: int | None, oversampling: float) -> None:
     """Render, develop and save one picture."""
     start = time.time()
-    linear = render_linear(shot, samples, oversampling)
+    linear = render_linear(shot, samples or shot.samples, oversampling)
     bright = np.percentile(linear.max(axis=2), 99.5) * shot.exposure
     codes = develop(linear, shot.camera, shot.exposure, 1000 + shot.seed)
     save_jpeg(folder / shot.file, codes, shot.nominal, shot.orientation)
@@ -239,7 +239,7 @@ def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Render the example pictures.")
     default = Path(__file__).resolve().parent.parent / "examples"
     parser.add_argument("--out", type=Path, default=default, help="folder to write to")
-    parser.add_argument("--samples", type=int, default=16, help="rays per source pixel")
+    parser.add_argument("--samples", type=int, help="rays per source pixel (default: by picture)")
     parser.add_argument("--oversampling", type=float, default=1.5, help="source pixels per pixel")
     parser.add_argument("--only", choices=NAMES, nargs="+", default=list(NAMES))
     parser.add_argument("--check", action="store_true", help="only compare pictures with truth")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 import render_shapes as rs
@@ -43,11 +44,17 @@ class Shot:
     things: list[Thing] = field(default_factory=list)
     orientation: int = 1
     notes: str = ""
+    samples: int = 20
 
 
 def quad(name: str, what: str, size: dict, corners: np.ndarray, check: bool = True) -> Thing:
     """A rectangle with corners in the order of ``CORNERS``."""
     return Thing(name, what, size, dict(zip(CORNERS, corners, strict=True)), check)
+
+
+def shifted(point, dx: float, dy: float, dz: float) -> np.ndarray:
+    """A point moved by (dx, dy, dz)."""
+    return np.add(point, (dx, dy, dz))
 
 
 def add_all(scene: rs.Scene, items) -> None:
@@ -128,10 +135,24 @@ def desk_props(scene: rs.Scene) -> None:
     tail = start - axis * 0.012
     scene.add(rs.tube([start, (start + tail) / 2, tail], [0.0040, 0.0040, 0.0038],
                       rs.matte(tx.rgb("c96a6a")), 12))  # fmt: skip
-    add_all(scene, rs.box((-0.44, 0.30, 0.0), (-0.14, 0.50, 0.030),
-                          {"front": rs.matte(0.72)}, rs.glossy(tx.rgb("27506b"), 0.3)))
-    add_all(scene, rs.box((-0.42, 0.31, 0.031), (-0.17, 0.48, 0.055),
-                          {"front": rs.matte(0.68)}, rs.glossy(tx.rgb("9c3a2c"), 0.3)))
+    add_all(
+        scene,
+        rs.box(
+            (-0.44, 0.30, 0.0),
+            (-0.14, 0.50, 0.030),
+            {"front": rs.matte(0.72)},
+            rs.glossy(tx.rgb("27506b"), 0.3),
+        ),
+    )
+    add_all(
+        scene,
+        rs.box(
+            (-0.42, 0.31, 0.031),
+            (-0.17, 0.48, 0.055),
+            {"front": rs.matte(0.68)},
+            rs.glossy(tx.rgb("9c3a2c"), 0.3),
+        ),
+    )
 
 
 def add_mug(scene: rs.Scene, base: np.ndarray) -> None:
@@ -211,19 +232,22 @@ def street() -> Shot:
     person = add_person(scene, np.array([-1.05, 8.0, 0.0]))
     van = add_van(scene, 0.35, 14.0)
     centre = np.array([-0.15, 0.0, 1.60])
-    target = centre + [np.sin(np.radians(1.0)), np.cos(np.radians(1.0)), -np.tan(np.radians(2.0))]
+    target = shifted(
+        centre, np.sin(np.radians(1.0)), np.cos(np.radians(1.0)), -np.tan(np.radians(2.0))
+    )
     camera = Camera(
         1800, 1200, 1829.4, 906.8, 596.1, (-0.062, 0.031, 0.0003, 0.0002, 0.0),
         look_at(centre, target, -0.3), centre,
     )  # fmt: skip
     nominal = Nominal("Cam 24", 24.0, 23.5, 15.67)
-    return Shot("street.jpg", scene, camera, nominal, 1.15, 3, [person, *van])
+    return Shot("street.jpg", scene, camera, nominal, 1.42, 3, [person, *van], samples=9)
 
 
 def street_ground(scene: rs.Scene) -> None:
     """Road with markings, kerbs and pavements (0.12 m above the road)."""
-    tar = tx.mottled((1024, 1024), "66676a", (24, 24), 71, 0.10)
-    scene.add(rs.panel((-3.2, 90, 0), (3.2, 90, 0), (-3.2, -6, 0), rs.matte(rs.image(tar, (2, 30)))))
+    tar = tx.mottled((1024, 1024), "66676a", (24, 24), 71, 0.06)
+    road = rs.matte(rs.image(tar, (2, 30)))
+    scene.add(rs.panel((-3.2, 90, 0), (3.2, 90, 0), (-3.2, -6, 0), road))
     paint = rs.matte(rs.image(tx.mottled((256, 256), "dcdad2", (12, 12), 72, 0.06)))
     for x in np.arange(-2.75, 3.0, 1.0):
         scene.add(rs.flat((x, 8.0, 0.002), 0.5, 3.0, 0.0, paint)[0])
@@ -243,7 +267,7 @@ def street_ground(scene: rs.Scene) -> None:
 
 def street_houses(scene: rs.Scene) -> None:
     """Two rows of terraced houses and a closing block."""
-    walls = "c9b596 b0603f d8d0c0 8f9aa0 c58f6a e0c890 a4533f b9b4a8".split()
+    walls = ("c9b596", "b0603f", "d8d0c0", "8f9aa0", "c58f6a", "e0c890", "a4533f", "b9b4a8")
     for side in (-1, 1):
         y = 1.0
         for index in range(8):
@@ -271,7 +295,8 @@ def street_green(scene: rs.Scene) -> None:
     spots += [(-9, 95), (-3, 104), (5, 98), (11, 106), (0, 110), (-14, 108)]
     for x, y in spots:
         scene.add(rs.tube([(x, y, 0), (x + 0.05, y, 1.3), (x, y, 2.8)], [0.13, 0.10, 0.08], bark))
-        crown = rs.foliage((x, y, 3.9), (1.35, 1.35, 1.5), 5200, 0.19, greens, 1000 + int(x * 7 + y * 31))
+        seed = 1000 + int(x * 7 + y * 31)
+        crown = rs.foliage((x, y, 3.9), (1.35, 1.35, 1.5), 5200, 0.19, greens, seed)
         add_all(scene, crown)
     for x, y in ((3.65, 17.5), (-3.65, 28.0), (3.65, 45.0)):
         scene.add(rs.tube([(x, y, 0.1), (x, y, 2.5), (x, y, 4.6)], [0.06, 0.045, 0.04], iron))
@@ -285,33 +310,49 @@ def add_person(scene: rs.Scene, at: np.ndarray) -> Thing:
     shoes, shirt = rs.glossy(tx.rgb("4a2f20"), 0.2), rs.matte(tx.rgb("e6e2d8"))
 
     def loft(sections, material):
-        table = np.asarray(sections, float) + [at[2], at[0], at[1], 0, 0]
+        table = np.add(sections, (at[2], at[0], at[1], 0, 0))
         scene.add(rs.loft(table, material))
 
     for s in (-1, 1):
         loft([(0.07, 0.11 * s, 0, 0.055, 0.062), (0.28, 0.108 * s, 0, 0.06, 0.066),
               (0.50, 0.104 * s, 0, 0.067, 0.07), (0.72, 0.098 * s, 0, 0.08, 0.085),
               (0.93, 0.088 * s, 0, 0.088, 0.10)], trousers)  # fmt: skip
-        loft([(0.0, 0.115 * s, -0.045, 0.045, 0.130), (0.03, 0.115 * s, -0.045, 0.049, 0.134),
-              (0.065, 0.113 * s, -0.03, 0.045, 0.105), (0.10, 0.11 * s, 0, 0.045, 0.06)], shoes)
-        arm = [at + p for p in np.array([(0.165 * s, 0, 1.395), (0.208 * s, 0.01, 1.26),
-                                         (0.230 * s, 0.02, 1.10), (0.242 * s, -0.03, 0.88)])]
+        loft(
+            [
+                (0.0, 0.115 * s, -0.045, 0.045, 0.130),
+                (0.03, 0.115 * s, -0.045, 0.049, 0.134),
+                (0.065, 0.113 * s, -0.03, 0.045, 0.105),
+                (0.10, 0.11 * s, 0, 0.045, 0.06),
+            ],
+            shoes,
+        )
+        arm = [
+            at + p
+            for p in np.array(
+                [
+                    (0.165 * s, 0, 1.395),
+                    (0.208 * s, 0.01, 1.26),
+                    (0.230 * s, 0.02, 1.10),
+                    (0.242 * s, -0.03, 0.88),
+                ]
+            )
+        ]
         scene.add(rs.tube(arm, [0.053, 0.052, 0.046, 0.038], coat))
         hand = at + np.array([0.243 * s, -0.045, 0.80])
         scene.add(rs.ellipsoid(hand, (0.030, 0.045, 0.078), skin))
-        scene.add(rs.ellipsoid(at + [0.075 * s, 0.005, 1.625], (0.018, 0.025, 0.034), skin))
-        scene.add(rs.ellipsoid(at + [0.030 * s, -0.086, 1.645], (0.010, 0.008, 0.006),
+        scene.add(rs.ellipsoid(shifted(at, 0.075 * s, 0.005, 1.625), (0.018, 0.025, 0.034), skin))
+        scene.add(rs.ellipsoid(shifted(at, 0.030 * s, -0.086, 1.645), (0.010, 0.008, 0.006),
                                rs.matte(0.03)))  # fmt: skip
     loft([(0.80, 0, 0, 0.192, 0.132), (0.92, 0, 0, 0.184, 0.126), (1.07, 0, 0, 0.166, 0.114),
           (1.22, 0, 0, 0.176, 0.118), (1.34, 0, 0, 0.186, 0.114), (1.42, 0, 0, 0.178, 0.100),
           (1.47, 0, 0, 0.105, 0.075), (1.495, 0, 0, 0.062, 0.060)], coat)  # fmt: skip
-    scene.add(rs.ellipsoid(at + [0, -0.062, 1.40], (0.045, 0.05, 0.085), shirt))
-    scene.add(rs.tube([at + [0, 0.01, 1.44], at + [0, 0.005, 1.50], at + [0, 0, 1.56]],
-                      [0.055, 0.052, 0.050], skin))  # fmt: skip
-    scene.add(rs.ellipsoid(at + [0, 0, 1.625], (0.074, 0.094, 0.116), skin))
-    scene.add(rs.ellipsoid(at + [0, -0.092, 1.612], (0.012, 0.018, 0.022), skin))
-    scene.add(rs.ellipsoid(at + [0, 0.022, 1.660], (0.084, 0.094, 0.090), hair))
-    points = {"soles": at, "head_top": at + [0, 0.022, 1.75]}
+    scene.add(rs.ellipsoid(shifted(at, 0, -0.045, 1.455), (0.044, 0.045, 0.045), shirt))
+    neck = [shifted(at, 0, 0.01, 1.44), shifted(at, 0, 0.005, 1.50), shifted(at, 0, 0, 1.56)]
+    scene.add(rs.tube(neck, [0.055, 0.052, 0.050], skin))
+    scene.add(rs.ellipsoid(shifted(at, 0, 0, 1.625), (0.074, 0.094, 0.116), skin))
+    scene.add(rs.ellipsoid(shifted(at, 0, -0.092, 1.612), (0.012, 0.018, 0.022), skin))
+    scene.add(rs.ellipsoid(shifted(at, 0, 0.010, 1.665), (0.083, 0.095, 0.085), hair))
+    points = {"soles": at, "head_top": shifted(at, 0, 0.010, 1.75)}
     what = "standing person; soles on the road midway between the feet, top of the hair"
     return Thing("person", what, {"height": 1.75}, points)
 
@@ -319,7 +360,7 @@ def add_person(scene: rs.Scene, at: np.ndarray) -> Thing:
 def add_van(scene: rs.Scene, left: float, y: float) -> list[Thing]:
     """Boxy van with a flat rear face at depth y."""
     right, bottom, top, back = left + 1.80, 0.28, 1.50, y + 4.40
-    paint = rs.glossy(tx.rgb("2f6f9f"), 0.12)
+    paint = rs.matte(tx.rgb("3a7cae"))
     add_all(scene, rs.box((left, y, bottom), (right, back - 0.9, top), {}, paint))
     add_all(scene, rs.box((left, back - 0.9, bottom), (right, back, 0.95), {}, paint))
     dark = rs.matte(0.02)
@@ -334,11 +375,11 @@ def add_van(scene: rs.Scene, left: float, y: float) -> list[Thing]:
     def decal(x0, x1, z0, z1, material):
         scene.add(rs.panel((left + x0, e, z1), (left + x1, e, z1), (left + x0, e, z0), material))
 
-    decal(0.20, 1.60, 0.93, 1.38, rs.glass_front(0.03))
-    decal(0.04, 0.17, 0.70, 1.12, rs.glossy(tx.rgb("b3141a"), 0.05))
-    decal(1.63, 1.76, 0.70, 1.12, rs.glossy(tx.rgb("b3141a"), 0.05))
+    decal(0.20, 1.60, 0.93, 1.38, rs.matte((0.030, 0.036, 0.042)))
+    decal(0.04, 0.17, 0.70, 1.12, rs.matte(tx.rgb("b3141a")))
+    decal(1.63, 1.76, 0.70, 1.12, rs.matte(tx.rgb("b3141a")))
     decal(0.0, 1.80, 0.30, 0.46, rs.matte(0.05))
-    decal(0.86, 0.94, 0.84, 0.88, rs.glossy(0.5, 0.1))
+    decal(0.86, 0.94, 0.84, 0.88, rs.matte(0.5))
     decal(0.62, 0.66, 0.95, 1.10, rs.matte(0.015))
     e = y - 0.004
     decal(0.64, 1.16, 0.58, 0.69, rs.matte(tx.rgb("ece8da")))
@@ -381,8 +422,8 @@ def stereo() -> tuple[Shot, Shot]:
     nominal = Nominal("Stereo 8", 8.0, 7.2, 5.4)
     note = "right camera centre is at (0.120, 0, 0) m in left camera axes"
     return (
-        Shot("stereo_left.jpg", scene, left, nominal, 0.95, 4, notes=note),
-        Shot("stereo_right.jpg", scene, right, nominal, 0.95, 5, notes=note),
+        Shot("stereo_left.jpg", scene, left, nominal, 0.80, 4, notes=note),
+        Shot("stereo_right.jpg", scene, right, nominal, 0.80, 5, notes=note),
     )
 
 
@@ -412,7 +453,7 @@ def stereo_room(scene: rs.Scene) -> None:
 
 def stereo_table(scene: rs.Scene) -> None:
     """Table top with boxes, a ball, books and a vase at 1 to 2.2 m."""
-    cloth = rs.matte(rs.image(tx.speckled((1500, 1800), "d6cbb2", "8a8f7c", 130, 24)))
+    cloth = rs.matte(rs.image(tx.speckled((1500, 1800), "cfc4ac", "a59f8a", 130, 14)))
     add_all(scene, rs.box((-0.95, 0.70, 0.68), (0.95, 2.20, 0.72), {"top": cloth},
                           rs.matte(tx.rgb("6b4426"))))  # fmt: skip
     for x in (-0.9, 0.84):
@@ -441,7 +482,7 @@ def stereo_table(scene: rs.Scene) -> None:
 def add_book(scene: rs.Scene, corner: np.ndarray, tint: str, turn: float, seed: int) -> None:
     """A lying book with a mottled cover."""
     cover = rs.matte(rs.image(tx.speckled((300, 400), tint, "e8e2d0", seed, 40)))
-    top, c = rs.flat(corner + [0, 0, 0.0349], 0.24, 0.17, turn, cover)
+    top, c = rs.flat(shifted(corner, 0, 0, 0.0349), 0.24, 0.17, turn, cover)
     scene.add(top)
     down = np.array([0, 0, -0.0345])
     spine = rs.matte(tx.rgb(tint) * 0.8)
@@ -463,13 +504,14 @@ def facade() -> Shot:
     facade_ground(scene)
     centre = np.array([-6.9, -9.83, 1.62])
     yaw, pitch = np.radians(35.0), np.radians(9.0)
-    target = centre + [np.sin(yaw), np.cos(yaw), np.tan(pitch)]
+    target = shifted(centre, np.sin(yaw), np.cos(yaw), np.tan(pitch))
     camera = Camera(
         1200, 1800, 1387.5, 604.6, 893.9, (-0.078, 0.062, -0.0004, 0.0003, 0.0),
         look_at(centre, target, 0.4), centre,
     )  # fmt: skip
     nominal = Nominal("Cam 18", 18.0, 15.67, 23.5)
-    return Shot("facade.jpg", scene, camera, nominal, 1.15, 6, things, orientation=6)
+    return Shot("facade.jpg", scene, camera, nominal, 1.15, 6, things, orientation=6,
+                samples=9)  # fmt: skip
 
 
 def openings() -> list[tuple[str, float, float, float, float]]:
@@ -504,8 +546,8 @@ def add_wall(scene: rs.Scene, holes, band: float = 0.12) -> None:
     xs = sorted({-9.0, 13.5, *(x for _, a, b, _, _ in holes for x in (a - band, a, b, b + band))})
     zs = sorted({0.0, 11.3, *(z for *_, c, d in holes for z in (c - band, c, d, d + band))})
     brick, stone = [], []
-    for x0, x1 in zip(xs[:-1], xs[1:], strict=True):
-        for z0, z1 in zip(zs[:-1], zs[1:], strict=True):
+    for x0, x1 in pairwise(xs):
+        for z0, z1 in pairwise(zs):
             mx, mz = (x0 + x1) / 2, (z0 + z1) / 2
             if any(a < mx < b and c < mz < d for _, a, b, c, d in holes):
                 continue
@@ -527,7 +569,7 @@ def add_opening(scene: rs.Scene, index: int, hole) -> None:
     depth = 0.14
     reveal = rs.matte(tx.rgb("1f4a3c" if name == "door" else "3a3d40"))
     corners = [(x0, z1), (x1, z1), (x1, z0), (x0, z0)]
-    for (ax, az), (bx, bz) in zip(corners, corners[1:] + corners[:1], strict=True):
+    for (ax, az), (bx, bz) in zip(corners, [*corners[1:], corners[0]], strict=True):
         scene.add(rs.panel((ax, 0, az), (bx, 0, bz), (ax, depth, az), reveal))
     if name == "door":
         add_door_leaf(scene, x0, x1, z0, z1, depth)
@@ -542,8 +584,14 @@ def add_opening(scene: rs.Scene, index: int, hole) -> None:
     scene.add(rs.panel((x0, depth, z1), (x1, depth, z1), (x0, depth, z0), pane))
     bar, t, y = rs.matte(tx.rgb("3a3d40")), 0.06, depth - 0.04
     middle, cross = (x0 + x1) / 2, z0 + 1.0
-    bars = [(x0, x0 + t, z0, z1), (x1 - t, x1, z0, z1), (x0, x1, z0, z0 + t), (x0, x1, z1 - t, z1),
-            (middle - 0.03, middle + 0.03, z0, z1), (x0, x1, cross - 0.025, cross + 0.025)]
+    bars = [
+        (x0, x0 + t, z0, z1),
+        (x1 - t, x1, z0, z1),
+        (x0, x1, z0, z0 + t),
+        (x0, x1, z1 - t, z1),
+        (middle - 0.03, middle + 0.03, z0, z1),
+        (x0, x1, cross - 0.025, cross + 0.025),
+    ]
     for a, b, c, d in bars:
         add_all(scene, rs.box((a, y, c), (b, depth, d), {}, bar))
 
@@ -577,7 +625,7 @@ def facade_ground(scene: rs.Scene) -> None:
     stone = rs.matte(rs.image(tx.slabs(512, 1, 206, "bdb8ae"), (48, 1)))
     add_all(scene, rs.box((-20, -5.0, -0.14), (28, -4.8, 0.0), {"front": stone, "top": stone},
                           stone))  # fmt: skip
-    tar = rs.matte(rs.image(tx.mottled((1024, 1024), "66676a", (24, 24), 207, 0.10), (8, 4)))
+    tar = rs.matte(rs.image(tx.mottled((1024, 1024), "66676a", (24, 24), 207, 0.07), (20, 5)))
     scene.add(rs.panel((-40, -5, -0.14), (40, -5, -0.14), (-40, -25, -0.14), tar))
     field_ = rs.matte(tx.rgb("7f8a68"))
     scene.add(rs.panel((-90, 150, -0.16), (90, 150, -0.16), (-90, -30, -0.16), field_))

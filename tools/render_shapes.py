@@ -15,6 +15,7 @@ class Scene:
     """Collects shapes and lights under automatic names."""
 
     def __init__(self, max_depth: int = 4) -> None:
+        """Empty scene for path tracing up to ``max_depth`` segments."""
         self.items: dict = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": max_depth, "hide_emitters": False},
@@ -262,7 +263,7 @@ def quads(corners: np.ndarray, material, uv: np.ndarray | None = None):
     """One mesh of many quadrilaterals (N, 4, 3), with optional texture coordinates."""
     count = len(corners)
     first = 4 * np.arange(count)[:, None]
-    faces = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]])
+    faces = np.concatenate([np.add(first, (0, 1, 2)), np.add(first, (0, 2, 3))])
     flat_uv = None if uv is None else uv.reshape(-1, 2)
     return mesh(corners.reshape(-1, 3), faces, material, False, flat_uv)
 

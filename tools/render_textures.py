@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import cv2
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -49,7 +51,7 @@ def mottled(shape, colour: str, cells, seed: int, amount: float = 0.08) -> np.nd
 
 def wood(shape, seed: int, planks: int = 6, light: str = "c99a66", dark: str = "8a5a31"):
     """Planks with grain running along x."""
-    h, w = shape
+    h = shape[0]
     rows = np.minimum(np.arange(h) * planks // h, planks - 1)
     warp = noise(shape, (planks * 2, 3), seed, 3)
     fine = noise(shape, (h // 6, 8), seed + 1, 2)
@@ -94,7 +96,7 @@ def a4_sheet() -> np.ndarray:
     draw.text((170, 285), "Distances from pictures", font=font(52), fill="#555555")
     draw.line((170, 370, 1510, 370), fill="#15203a", width=7)
     y = 430
-    for paragraph in range(2):
+    for _ in range(2):
         for line in TEXT:
             draw.text((170, y), line, font=font(41), fill="#222222")
             y += 60
@@ -280,10 +282,21 @@ def book_spines(seed: int, count: int = 16) -> np.ndarray:
     rng = np.random.default_rng(seed)
     image = Image.new("RGB", (1200, 400), "#1c1712")
     draw = ImageDraw.Draw(image)
-    palette = "a33b2e 2f5d7c d9c79a 3d6b45 7a4f8a c9822b 24303f e3ddd0 8c2f45 4f7f86".split()
+    palette = [
+        "a33b2e",
+        "2f5d7c",
+        "d9c79a",
+        "3d6b45",
+        "7a4f8a",
+        "c9822b",
+        "24303f",
+        "e3ddd0",
+        "8c2f45",
+        "4f7f86",
+    ]
     edges = np.concatenate([[0], np.cumsum(rng.uniform(0.7, 1.4, count))])
     edges = (edges / edges[-1] * 1200).astype(int)
-    for left, right in zip(edges[:-1], edges[1:], strict=True):
+    for left, right in pairwise(edges):
         top = int(rng.integers(10, 110))
         colour = "#" + palette[int(rng.integers(len(palette)))]
         draw.rectangle((int(left) + 2, top, int(right) - 2, 399), fill=colour)

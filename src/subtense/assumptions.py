@@ -61,6 +61,11 @@ def angle(value: float, half_digit: float) -> Quantity:
     return Quantity.uniform(value - half_digit, value + half_digit, "rad", "assumed: half its last digit")
 
 
+def frontal() -> Quantity:
+    """An object that faces the camera."""
+    return Quantity.exact(0.0, "rad", "assumed: the object faces the camera")
+
+
 def unknown_tilt() -> Quantity:
     """The tilt of an object of which nothing was said: within 20 degrees either way."""
     text = "assumed: within 20° of facing the camera"

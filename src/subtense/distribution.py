@@ -1,4 +1,5 @@
-"""The laws an uncertain number can follow: normal, uniform, triangular, arcsine, t, curvilinear trapezoid, one-sided.
+"""The laws an uncertain number can follow: normal, uniform, triangular, arcsine, t, curvilinear trapezoid,
+one-sided, and one of two values.
 
 A `Distribution` is standardised: it describes z, and the number is `value + u * z`. All but `t` have a
 root mean square of 1 about the stated value, so that u is what the law of propagation (GUM 5.1.2) needs;
@@ -32,7 +33,8 @@ class Distribution:
     Attributes:
         name: a key of LAWS.
         shape: the law's own parameter: degrees of freedom of `t`; ratio of the limits' half-uncertainty to the
-            half-width for `curvilinear_trapezoid`; the side (+1 or -1) of `one_sided`; unused (0) elsewhere.
+            half-width for `curvilinear_trapezoid`; the side (+1 or -1) of `one_sided`; the probability of the other
+            value for `either`; unused (0) elsewhere.
     """
 
     name: str = "normal"
@@ -53,7 +55,7 @@ class Distribution:
     @property
     def mean(self) -> float:
         """Mean of z: 0 for all laws that are symmetric about the stated value."""
-        return self.shape * _ROOT3 / 2.0 if self.name == "one_sided" else 0.0
+        return {"one_sided": self.shape * _ROOT3 / 2.0, "either": math.sqrt(self.shape)}.get(self.name, 0.0)
 
     @property
     def excess_kurtosis(self) -> float:
@@ -158,6 +160,10 @@ LAWS: dict[str, Law] = {
         lambda dof: 6.0 / (dof - 4.0) if dof > 4 else math.inf,
     ),
     "curvilinear_trapezoid": Law(_draw_trapezoid, _trapezoid_quantile, _trapezoid_kurtosis),
+    "either": Law(
+        lambda r, n, p: (r.random(n) < p) / math.sqrt(p), lambda q, p: 0.0 if q < 1 - p else 1 / math.sqrt(p),
+        lambda p: (1 - 6 * p * (1 - p)) / (p * (1 - p)),
+    ),
     "one_sided": Law(
         lambda r, n, side: side * _ROOT3 * r.random(n), _one_sided_quantile, lambda _: -1.2
     ),

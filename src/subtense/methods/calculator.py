@@ -14,18 +14,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..distribution import Array
+from ..assumptions import frontal
+from ..focus import classical, close_focus
 from ..geometry import segment_depth
 from ..method import Method, Output, Reason, Reasons, reasons
 from ..quantity import Note, Quantity
-from .known_size import close_focus, frontal
 
 UNKNOWNS = ("distance", "size", "extent", "focal_length")
 """What can be left out, and is then solved for."""
-
-
-def classical_focus() -> Quantity:
-    """Nothing is added; up to all of the thin-lens extension is possible."""
-    return Quantity.one_sided(0.0, 1.0, "1", "assumed: between no and all of the thin-lens extension")
 
 
 def centred() -> Quantity:
@@ -68,7 +64,7 @@ class Inputs:
     tilt: Quantity = field(default_factory=frontal)
     offset_x: Quantity = field(default_factory=centred)
     offset_y: Quantity = field(default_factory=centred)
-    focus: Quantity = field(default_factory=classical_focus)
+    focus: Quantity = field(default_factory=classical)
 
     @property
     def unknown(self) -> str:

@@ -15,25 +15,13 @@ import numpy as np
 
 from ..camera import Camera
 from ..distribution import Array
+from ..assumptions import frontal
+from ..focus import close_focus, thin_lens
 from ..geometry import segment_depth
 from ..lenses import LENSES
 from ..method import Method, Output, Reason, Reasons, reasons
 from ..observation import Observation
 from ..quantity import Note, Quantity
-
-CLOSE_FOCAL_LENGTHS = 50
-"""Below so many focal lengths the focus extension is noted."""
-
-
-def thin_lens() -> Quantity:
-    """All of the thin-lens extension is added, and as much again is its u: inner focusing goes the other way."""
-    return Quantity.normal(1.0, 1.0, "1", "assumed: thin lens focused on the object, inner focusing possible")
-
-
-def frontal() -> Quantity:
-    """An object that faces the camera."""
-    return Quantity.exact(0.0, "rad", "assumed: the object faces the camera")
-
 
 @dataclass(frozen=True)
 class Inputs:
@@ -142,17 +130,6 @@ def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
                           "reaches to the near side", 'state it, as in --tilt "0 ± 3 deg", or use a marker'))  # fmt: skip
     note = close_focus(inputs.camera.nominal_focal_m, float(result.depth_m), inputs.focus)
     return (*found, note) if note else tuple(found)
-
-
-def close_focus(focal_m: float | None, depth_m: float, focus: Quantity) -> Note | None:
-    """The note on the focus extension, below CLOSE_FOCAL_LENGTHS of a nominal focal length."""
-    if not focal_m or depth_m >= CLOSE_FOCAL_LENGTHS * focal_m:
-        return None
-    added = float(focus.value) * focal_m
-    text = f"closer than {CLOSE_FOCAL_LENGTHS} focal lengths a lens focused here draws larger than its nominal focal length"
-    done = f"; {added * 1000:.3g} mm of thin-lens extension are added" if added else (
-        f"; a thin lens would put the object at {(depth_m + focal_m) * 1000:.2f} mm")  # fmt: skip
-    return Note("close_focus", text + done, "calibrate the camera at this focus")
 
 
 def example() -> Inputs:

@@ -1,0 +1,106 @@
+"""Camera from what a person types: `f=1500px`, `f=35mm,sensor=14.1mm`, `fov=70deg`, a preset or a sensor's name.
+
+A bare ± is a 95 % half-width; what is said without one gets the defaults of `assumptions`. With the name or the width of
+a sensor alone, the focal length is taken from the photo's metadata.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from .. import assumptions
+from ..camera import Camera
+from ..errors import InputError
+from ..hypothesis import Hypothesis, unknown_lens
+from ..photo import Photo
+from ..presets import find_preset
+from ..quantity import Quantity
+from ..tagged_size import tagged_size
+
+NAME = "typed"
+KEYS = ("f", "sensor", "fov")
+
+
+def camera(text: str, photo: Photo) -> Hypothesis:
+    """The camera of this text for this photo.
+
+    Raises:
+        InputError: neither key=value pairs nor a known name, or something missing.
+    """
+    found = _from_pairs(text, photo) if "=" in text else _from_preset(text, photo)
+    return Hypothesis(NAME, found, found.source)
+
+
+def _from_pairs(text: str, photo: Photo) -> Camera:
+    said = {}
+    for pair in text.split(","):
+        key, _, value = pair.partition("=")
+        if key.strip() not in KEYS or key.strip() in said:
+            raise InputError("--camera", text, "write f=1500px, or f=35mm,sensor=14.1mm, or fov=70deg")
+        said[key.strip()] = value.strip()
+    if set(said) == {"fov"}:
+        return _from_field_of_view(said["fov"], photo)
+    if set(said) == {"f"} and said["f"].rstrip(" )").lower().endswith(("px", "pixels", "pixel", "%", "exact")):
+        return _from_pixels(said["f"], photo)
+    if set(said) == {"f", "sensor"}:
+        focal = Quantity.parse(said["f"], "m", bare="mm", name="--camera f", assume=assumptions.focal_length)
+        sensor = Quantity.parse(said["sensor"], "m", bare="mm", name="--camera sensor", assume=assumptions.sensor_width)
+        return _from_lengths(focal, sensor, photo, "focal length and sensor width as stated")
+    if set(said) == {"sensor"}:
+        sensor = Quantity.parse(said["sensor"], "m", bare="mm", name="--camera sensor", assume=assumptions.sensor_width)
+        return _from_lengths(_tagged_focal(text, photo), sensor, photo, "sensor width as stated, EXIF focal length")
+    raise InputError("--camera", text, "write f=1500px, or f=35mm,sensor=14.1mm, or fov=70deg; a focal length in mm needs the sensor")
+
+
+def _from_pixels(text: str, photo: Photo) -> Camera:
+    """A focal length in pixels is a calibrated one: without ± it is taken to 0.5 %."""
+    def assume(value: float, _: float) -> Quantity:
+        return Quantity.normal(value, 0.005 * value, "px", "assumed: 0.5 %")
+
+    f = Quantity.parse(text, "px", name="--camera f", assume=assume)
+    _above_zero("--camera f", f, text)
+    made = unknown_lens(photo.width_px, photo.height_px, float(f.value), float(f.u), f"focal length in pixels, {f.source}")
+    return made
+
+
+def _from_field_of_view(text: str, photo: Photo) -> Camera:
+    """The angle across the picture's width: f = W / (2 tan(angle / 2))."""
+    fov = Quantity.parse(text, "rad", bare="deg", name="--camera fov", assume=assumptions.angle)
+    angle = float(fov.value)
+    if not 0.01 < angle < math.radians(175):
+        raise InputError("--camera fov", text, "give the angle across the picture's width, 1 to 175 deg")
+    f_px = photo.width_px / 2 / math.tan(angle / 2)
+    u = float(fov.u) * photo.width_px / 4 / math.sin(angle / 2) ** 2
+    return unknown_lens(photo.width_px, photo.height_px, f_px, math.hypot(u, assumptions.NOMINAL_FOCAL * f_px),
+                        f"field of view across the width, {fov.source}")  # fmt: skip
+
+
+def _from_lengths(focal: Quantity, sensor: Quantity, photo: Photo, source: str) -> Camera:
+    """f_px = f * W / sensor width, W the side that lies along the sensor's width, corrected for a digital zoom."""
+    _above_zero("--camera f", focal, f"{float(focal.value)} m")
+    _above_zero("--camera sensor", sensor, f"{float(sensor.value)} m")
+    size = tagged_size(photo)
+    f_px = float(focal.value) / float(sensor.value) * max(photo.stored_size_px) * size.zoom
+    relative = math.hypot(float(focal.u / focal.value), float(sensor.u / sensor.value), size.relative_u)
+    return unknown_lens(photo.width_px, photo.height_px, f_px, relative * f_px, source, float(focal.value))
+
+
+def _tagged_focal(text: str, photo: Photo) -> Quantity:
+    if photo.metadata.focal_mm is None:
+        raise InputError("--camera", text, "the photo's metadata has no focal length; add it, as in f=35mm,sensor=14.1mm")
+    return assumptions.focal_length(photo.metadata.focal_mm / 1000, 5e-5)
+
+
+def _from_preset(text: str, photo: Photo) -> Camera:
+    preset = find_preset(text)
+    if preset.focal_length is None:
+        made = _from_lengths(_tagged_focal(text, photo), preset.sensor_width, photo, f"preset {preset.name}, EXIF focal length")
+    else:
+        made = _from_lengths(preset.focal_length, preset.sensor_width, photo, f"preset {preset.name}: the range of its class")
+    return replace(made, id=None)
+
+
+def _above_zero(name: str, quantity: Quantity, text: str) -> None:
+    if not float(quantity.value) > 0:
+        raise InputError(name, text, "give a number above 0")
