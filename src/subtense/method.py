@@ -75,6 +75,7 @@ class Method:
         source: where the relation is published.
         typical: its usual relative error, in words.
         example: makes Inputs for documentation and contract tests.
+        prepare: settles what the inputs leave open (the weight of a second solution) before anything is moved.
         start: for estimators, the nominal solution that `function` refines (its second argument).
         derivative: partial derivatives by (field, part key): {output: {(field, key): (k, ...)}}; None where it has none.
         notes: doubts that follow from the inputs and the nominal result.
@@ -90,6 +91,7 @@ class Method:
     source: str
     typical: str
     example: Callable[[], Any]
+    prepare: Callable[[Any], Any] = field(default=lambda inputs: inputs)
     start: Callable[[Any], Any] | None = None
     derivative: Callable[[Any, Any], Mapping[str, Mapping[tuple[str, str], Array]] | None] | None = None
     notes: Callable[[Any, Any], tuple[Note, ...]] = field(default=lambda inputs, result: ())

@@ -538,6 +538,7 @@ def measure(
     """
     if not 0.5 <= level < 1:
         raise InputError("level", level, "give a coverage from 0.5 to below 1, as 0.95")
+    inputs = method.prepare(inputs)
     space = Space((inputs,))
     if space.leading:
         raise InputError("inputs", f"with leading axes {space.leading}", "one scene at a time; use rows() for many")

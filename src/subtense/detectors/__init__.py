@@ -1,0 +1,1 @@
+"""Ways to get Observations from a Photo, one per file. The table is `subtense.workflow.DETECTORS`."""
