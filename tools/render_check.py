@@ -111,7 +111,8 @@ def check_person(folder: Path, entry: dict) -> list[float]:
                 u, v = point["pixel_px"]
                 s = np.linspace(-5, 5, 101)
                 profile = ndimage.map_coordinates(picture, [v + s, np.full(101, u)], order=3)
-                slope = np.abs(np.gradient(ndimage.gaussian_filter1d(profile, 4)))
+                slope = np.gradient(ndimage.gaussian_filter1d(profile, 4))
+                slope = np.maximum(slope * np.sign(slope[np.argmax(np.abs(slope))]), 0)
                 near = np.abs(np.arange(101) - np.argmax(slope)) <= 18
                 offset = (slope * s)[near].sum() / slope[near].sum()
                 print(f"  head top {offset:+.3f} px")

@@ -59,7 +59,7 @@ def take(shot: Shot, folder: Path, samples: int | None, oversampling: float) -> 
     linear = render_linear(shot, samples or shot.samples, oversampling)
     bright = np.percentile(linear.max(axis=2), 99.5) * shot.exposure
     codes = develop(linear, shot.camera, shot.exposure, 1000 + shot.seed)
-    save_jpeg(folder / shot.file, codes, shot.nominal, shot.orientation)
+    save_jpeg(folder / shot.file, codes, shot.nominal, shot.orientation, shot.quality)
     size = (folder / shot.file).stat().st_size // 1000
     print(f"{shot.file}: {time.time() - start:.0f} s, {size} kB, 99.5 % level {bright:.2f}")
 

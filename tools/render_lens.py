@@ -228,9 +228,9 @@ def build_exif(nominal: Nominal, stored_size: tuple[int, int], orientation: int)
     return exif
 
 
-def save_jpeg(path, upright: np.ndarray, nominal: Nominal, orientation: int = 1) -> None:
+def save_jpeg(path, upright: np.ndarray, nominal: Nominal, orientation: int, quality: int) -> None:
     """Write a JPEG; orientation 6 stores the picture turned 90 degrees counter-clockwise."""
     stored = np.rot90(upright) if orientation == 6 else upright
     image = Image.fromarray(np.ascontiguousarray(stored))
     exif = build_exif(nominal, image.size, orientation)
-    image.save(path, quality=92, subsampling=0, optimize=True, exif=exif)
+    image.save(path, quality=quality, subsampling=0, optimize=True, exif=exif)

@@ -45,6 +45,7 @@ class Shot:
     orientation: int = 1
     notes: str = ""
     samples: int = 20
+    quality: int = 92
 
 
 def quad(name: str, what: str, size: dict, corners: np.ndarray, check: bool = True) -> Thing:
@@ -226,7 +227,7 @@ def street() -> Shot:
     scene = rs.Scene()
     scene.add(rs.sky_light(tx.sky(70), 0.62))
     scene.add(rs.sun((-0.42, -0.85, 0.80), (2.6, 2.4, 2.05)))
-    street_ground(scene)
+    stripes = street_ground(scene)
     street_houses(scene)
     street_green(scene)
     person = add_person(scene, np.array([-1.05, 8.0, 0.0]))
@@ -240,17 +241,22 @@ def street() -> Shot:
         look_at(centre, target, -0.3), centre,
     )  # fmt: skip
     nominal = Nominal("Cam 24", 24.0, 23.5, 15.67)
-    return Shot("street.jpg", scene, camera, nominal, 1.42, 3, [person, *van], samples=9)
+    return Shot("street.jpg", scene, camera, nominal, 1.42, 3, [person, *van, *stripes], samples=9)
 
 
-def street_ground(scene: rs.Scene) -> None:
-    """Road with markings, kerbs and pavements (0.12 m above the road)."""
+def street_ground(scene: rs.Scene) -> list[Thing]:
+    """Road with markings, kerbs and pavements (0.12 m above the road); returns the stripes."""
     tar = tx.mottled((1024, 1024), "66676a", (24, 24), 71, 0.06)
     road = rs.matte(rs.image(tar, (2, 30)))
     scene.add(rs.panel((-3.2, 90, 0), (3.2, 90, 0), (-3.2, -6, 0), road))
     paint = rs.matte(rs.image(tx.mottled((256, 256), "dcdad2", (12, 12), 72, 0.06)))
-    for x in np.arange(-2.75, 3.0, 1.0):
-        scene.add(rs.flat((x, 8.0, 0.002), 0.5, 3.0, 0.0, paint)[0])
+    stripes = []
+    for index, x in enumerate(np.arange(-2.75, 3.0, 1.0)):
+        stripe, corners = rs.flat((x, 8.0, 0.002), 0.5, 3.0, 0.0, paint)
+        scene.add(stripe)
+        size = {"width": 0.5, "length": 3.0}
+        stripes.append(quad(f"stripe_{index}", "painted stripe on the road", size, corners,
+                            index != 1))  # fmt: skip
     for y in np.arange(12.5, 80, 6.0):
         scene.add(rs.flat((-0.95, y, 0.002), 0.12, 2.5, 0.0, paint)[0])
     stone = rs.matte(rs.image(tx.slabs(512, 1, 73, "b0aca4"), (1, 60)))
@@ -263,6 +269,7 @@ def street_ground(scene: rs.Scene) -> None:
         scene.add(rs.panel((low, 90, 0.12), (high, 90, 0.12), (low, -6, 0.12), paving))
     grass = rs.matte(rs.image(tx.mottled((512, 512), "6d7f4a", (20, 20), 75, 0.2), (40, 20)))
     scene.add(rs.panel((-200, 300, -0.02), (200, 300, -0.02), (-200, 84, -0.02), grass))
+    return stripes
 
 
 def street_houses(scene: rs.Scene) -> None:
@@ -390,7 +397,7 @@ def add_van(scene: rs.Scene, left: float, y: float) -> list[Thing]:
     what = "van; points are the flat rear face, its lower edge 0.28 m and its upper 1.50 m up"
     return [
         quad("car_rear", what, size, corners, False),
-        quad("number_plate", "number plate", {"width": 0.52, "height": 0.11}, plate, False),
+        quad("number_plate", "number plate", {"width": 0.52, "height": 0.11}, plate),
     ]
 
 
@@ -510,8 +517,8 @@ def facade() -> Shot:
         look_at(centre, target, 0.4), centre,
     )  # fmt: skip
     nominal = Nominal("Cam 18", 18.0, 15.67, 23.5)
-    return Shot("facade.jpg", scene, camera, nominal, 1.15, 6, things, orientation=6,
-                samples=9)  # fmt: skip
+    return Shot("facade.jpg", scene, camera, nominal, 1.36, 6, things, orientation=6,
+                samples=9, quality=88)  # fmt: skip
 
 
 def openings() -> list[tuple[str, float, float, float, float]]:

@@ -79,6 +79,7 @@ class Method:
         start: for estimators, the nominal solution that `function` refines (its second argument).
         derivative: partial derivatives by (field, part key): {output: {(field, key): (k, ...)}}; None where it has none.
         notes: doubts that follow from the inputs and the nominal result.
+        most_draws: where the adaptive procedure stops at the latest.
         vectorised: False for engines that take one scene at a time.
     """
 
@@ -96,6 +97,7 @@ class Method:
     derivative: Callable[[Any, Any], Mapping[str, Mapping[tuple[str, str], Array]] | None] | None = None
     notes: Callable[[Any, Any], tuple[Note, ...]] = field(default=lambda inputs, result: ())
     vectorised: bool = True
+    most_draws: int = 1_000_000
 
     @property
     def needs(self) -> str:

@@ -25,7 +25,7 @@ from .quantity import Note
 MOST_PIXELS = 250_000_000
 MOST_BYTES = 512 * 2**20
 MOST_EXIF_BYTES = 2**20
-FORMATS = ("JPEG", "MPO", "PNG", "TIFF", "WEBP", "BMP")
+FORMATS = ("JPEG", "PNG", "TIFF", "WEBP", "BMP")
 TURNS = {1: 0, 3: 2, 6: 1, 8: 3}
 """EXIF orientation: clockwise quarter turns that make the stored picture upright (2, 4, 5, 7 are also mirrored)."""
 

@@ -31,7 +31,6 @@ BLOCK = 10_000
 """Draws of one block of the adaptive procedure (JCGM 101, 7.9.4)."""
 FEWEST_BLOCKS = 10
 """Two blocks can agree by chance: their scatter says nothing yet."""
-MOST_DRAWS = 1_000_000
 NEARLY_NORMAL = 0.4
 """Excess kurtosis up to which Cornish and Fisher's expansion is trusted: a uniform input may make half the variance."""
 PAIRS_UP_TO = 24
@@ -46,6 +45,7 @@ class Model:
 
     names: tuple[str, ...]
     call: Callable[[tuple[Any, ...]], tuple[Array, npt.NDArray[np.int8]]]
+    most_draws: int = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def _method_model(method: Method, inputs: Any) -> Model:
         values = [np.broadcast_to(np.asarray(getattr(result, n), float), reason.shape) for n in names]
         return np.where(reason == 0, np.stack(values), np.nan), reason
 
-    return Model(names, call)
+    return Model(names, call, method.most_draws)
 
 
 # -- first order -----------------------------------------------------------------------------------------
@@ -505,7 +505,7 @@ def _adaptive(model: Model, space: Space, level: float, seed: int, wanted: Seque
         chosen = Draws(block.names, block.values[outputs], block.reason)
         statistics.append(np.stack([chosen.mean, chosen.u, ends[:, 0], ends[:, 1]]))
         stable = len(blocks) >= FEWEST_BLOCKS and _steady(np.stack(statistics))
-        if stable or len(blocks) * BLOCK >= MOST_DRAWS:
+        if stable or len(blocks) * BLOCK >= model.most_draws:
             values = np.concatenate([b.values for b in blocks], axis=1)
             return Draws(model.names, values, np.concatenate([b.reason for b in blocks]), stable)
 

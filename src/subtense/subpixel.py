@@ -1,11 +1,12 @@
 """Sub-pixel edges in linear light: the four sides of a dark square on a light ground, and its corners with covariance.
 
-Each side is fitted as a blurred step over the pixels of a strip along it:
-I = low + (high - low) Phi((n - a - b t - c t^2) / s), with low and high linear in t. Fitting pixels, not interpolated
-profiles, leaves their noise independent, so the covariance is that of the residuals.
+Each side is fitted as a step that was blurred in linear light and then encoded, over the pixels of a strip along it:
+v = (low^g + (high^g - low^g) Phi((n - a - b t - c t^2) / s))^(1/g), with the encoded plateaus low and high linear in t.
+An edge located in encoded values would move by up to 0.8 blur radii into the dark side. The exponent g is that of sRGB by
+default, known to +-CURVE_U only; the asymmetry of the edges tells more of it, and what stays unknown moves all sides out or
+in together. Fitting pixels, not interpolated profiles, leaves their noise independent.
 
-Source: the blurred-edge model of W. Förstner and B. Wrobel, Photogrammetric Computer Vision, 15.3; traps of encoded values:
-an edge blurred in linear light and located in encoded values moves by up to 0.8 blur radii into the dark side.
+Source: the blurred-edge model of W. Förstner and B. Wrobel, Photogrammetric Computer Vision, 15.3; IEC 61966-2-1 (sRGB).
 """
 
 from __future__ import annotations
@@ -18,21 +19,27 @@ import numpy.typing as npt
 
 from .distribution import Array
 
-CURVE_SHIFT = 0.15
-"""u of an edge's place, in blur radii, because a camera's transfer curve is not exactly that of sRGB."""
-MODEL_SIGMA_PX = 0.02
-"""What the edge model leaves out: uneven sampling, printing."""
+CURVE = 2.2
+"""Exponent of the transfer curve where nothing is known: that of sRGB over most of its range."""
+CURVE_U = 0.5
+"""Its u: cameras draw their own contrast curves."""
+LEAST_CURVE_U = 0.2
+"""What one side can tell of the exponent at best: its blur is not exactly a normal law."""
+PIXEL_BLUR = 0.28
+"""A pixel's own width as a blur radius."""
+SIDE_SIGMA_PX = 0.1
+"""How far a whole side may lie off, whatever the residuals say: uneven prints, resampled pictures, unlike blur."""
+CORNER_SIGMA_PX = 0.02
+"""The same for a single corner."""
 CURVED_FROM_PX = 80.0
 """Sides longer than this may be bent by the lens, and get a quadratic term."""
 WIDEST_STRIP_PX = 6.0
 _SAMPLES = 1500
 
 
-def linear_light(pixels: npt.NDArray[np.uint8]) -> Array:
-    """(H, W, 3) sRGB to (H, W) linear luminance, 0 to 1 (IEC 61966-2-1)."""
-    v = np.arange(256) / 255.0
-    table = np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
-    return np.asarray(table[pixels] @ np.array([0.2126, 0.7152, 0.0722]))
+def encoded_gray(pixels: npt.NDArray[np.uint8]) -> Array:
+    """(H, W, 3) RGB to (H, W) encoded luminance, 0 to 1."""
+    return np.asarray(pixels @ np.array([0.2126, 0.7152, 0.0722]) / 255.0)
 
 
 @dataclass(frozen=True)
@@ -42,22 +49,34 @@ class Side:
     Attributes:
         start: (2,) px.
         along: (2,) unit vector.
+        extent: (2,) from start to end, px.
         across: (2,) unit vector, to the outside.
         bend: (3,) a, b, c.
         cov: (3, 3) of them.
-        blur_px: radius of the blur.
-        contrast: high less low.
+        contrast: encoded high less low.
         misfit: rms residual over contrast.
+        by_curve: (3,) change of a, b, c with the exponent of the transfer curve.
+        curve: the exponent that fits this side best, given what was assumed of it.
+        u_curve: its u.
     """
 
     start: Array
+    extent: Array
     along: Array
     across: Array
     bend: Array
     cov: Array
-    blur_px: float
     contrast: float
     misfit: float
+    by_curve: Array
+    curve: float
+    u_curve: float
+
+    @property
+    def tells_curve(self) -> bool:
+        """Whether the side crosses pixels at many places; one along a row shows a single phase, and no asymmetry."""
+        slope = float(abs(self.along).min()) + abs(self.bend[1])
+        return slope * float(np.hypot(*self.extent)) > 2.0
 
 
 @dataclass(frozen=True)
@@ -70,11 +89,11 @@ class Quad:
     contrast: float
 
 
-def refine_quad(light: Array, corners_px: Array, module_px: float) -> Quad | None:
+def refine_quad(gray: Array, corners_px: Array, module_px: float) -> Quad | None:
     """Refine the corners of a dark square on a light ground.
 
     Args:
-        light: (H, W) linear luminance.
+        gray: (H, W) encoded luminance, 0 to 1.
         corners_px: (4, 2) rough corners, in order around.
         module_px: width of what is surely plain on either side of the edges (a marker's module).
 
@@ -83,20 +102,45 @@ def refine_quad(light: Array, corners_px: Array, module_px: float) -> Quad | Non
     """
     corners = np.asarray(corners_px, float)
     half = float(np.clip(0.75 * module_px, 1.6, WIDEST_STRIP_PX))
-    for _ in range(2):  # the second pass has its strips where the sides are
-        sides = [fit_side(light, corners[i], corners[(i + 1) % 4], corners.mean(axis=0), half) for i in range(4)]
-        if any(side is None for side in sides):
-            return None
-        good = [side for side in sides if side is not None]
-        corners = _corners(good, np.stack([side.bend for side in good]))
-    contrast = min(side.contrast for side in good)
-    return Quad(corners, _corner_cov(good, corners), max(side.misfit for side in good), contrast)
+    curve, u_curve = CURVE, CURVE_U
+    sides = _sides(gray, corners, half, curve, u_curve)
+    if sides is None:
+        return None
+    # the sides share one curve: theirs, averaged with the assumed one, which each of them already holds
+    weight = np.array([side.tells_curve * (1 / side.u_curve**2 - 1 / CURVE_U**2) for side in sides]).clip(0.0, LEAST_CURVE_U**-2)
+    u_curve = float((weight.sum() + 1 / CURVE_U**2) ** -0.5)
+    own = np.array([side.curve for side in sides])
+    own = CURVE + (own - CURVE) * (weight + 1 / CURVE_U**2) / np.maximum(weight, 1e-9)  # without the assumption
+    curve = float(np.clip((np.sum(weight * own) + CURVE / CURVE_U**2) * u_curve**2, 0.8, 3.5))
+    corners = _corners(sides, np.stack([side.bend for side in sides]))
+    sides = _sides(gray, corners, half, curve, None)  # now the strips are where the sides are
+    if sides is None:
+        return None
+    corners = _corners(sides, np.stack([side.bend for side in sides]))
+    cov = _corner_cov(sides, corners, u_curve)
+    return Quad(corners, cov, max(side.misfit for side in sides), min(side.contrast for side in sides))
 
 
-def fit_side(light: Array, start: Array, end: Array, inside: Array, half: float) -> Side | None:
-    """Fit one side in a strip of +-half px, from a light outside to a dark inside."""
-    from scipy.optimize import least_squares
+def _sides(gray: Array, corners: Array, half: float, curve: float, u_curve: float | None) -> list[Side] | None:
+    middle = corners.mean(axis=0)
+    sides = [fit_side(gray, corners[i], corners[(i + 1) % 4], middle, half, curve, u_curve) for i in range(4)]
+    return None if any(side is None for side in sides) else [side for side in sides if side is not None]
 
+
+def fit_side(
+    gray: Array, start: Array, end: Array, inside: Array, half: float, curve: float, u_curve: float | None
+) -> Side | None:
+    """Fit one side in a strip of +-half px, from a light outside to a dark inside.
+
+    Args:
+        gray: (H, W) encoded luminance.
+        start: (2,) one end, px.
+        end: (2,) the other.
+        inside: (2,) a point on the dark side.
+        half: half width of the strip, px.
+        curve: exponent of the transfer curve.
+        u_curve: its u, to let the edge tell more of it; None to hold it.
+    """
     length = float(np.hypot(*(end - start)))
     if length < 6:
         return None
@@ -104,43 +148,71 @@ def fit_side(light: Array, start: Array, end: Array, inside: Array, half: float)
     across = np.array([along[1], -along[0]])
     if across @ (inside - start) > 0:
         across = -across
-    t, n, value = _strip(light, start, along, across, length, half)
+    t, n, value = _strip(gray, start, along, across, length, half)
     if len(value) < 24:
         return None
-    low, high = np.median(value[n < -half / 3]), np.median(value[n > half / 3])
-    if not high - low > 0.02:
+    low, high = (float(np.median(value[where])) for where in (n < -half / 3, n > half / 3))
+    if not high - low > 0.05:
         return None
     u = 2 * t / length - 1  # -1 to 1 along the side, for a well-conditioned fit
-    curved = length > CURVED_FROM_PX
-    x0 = np.array([0.0, 0.0, 0.7, low, high, 0.0, 0.0] + [0.0] * curved)
-
-    scale = high - low
-    fit = least_squares(lambda x: (_edge(x, u, n) - value) / scale, x0, jac=lambda x: _edge_jacobian(x, u, n) / scale,
-                        method="trf", x_scale=np.array([1, 1, 0.5, scale, scale, scale, scale] + [1.0] * curved),
-                        max_nfev=40)  # fmt: skip
-    x = fit.x
-    if not fit.success or abs(x[0]) > half or abs(x[2]) > 2.5 * half or not x[4] - x[3] > 0.02:
+    x = np.array([0.0, 0.0, 0.6, low, high, 0.0, 0.0, curve, 0.0])
+    free = [0, 1, 2, 3, 4, 5, 6] + ([8] if length > CURVED_FROM_PX else [])
+    x, cov, sigma = _fit(x, free, u, n, value, None)
+    if u_curve is not None and x is not None:
+        x, cov, sigma = _fit(x, [*free, 7], u, n, value, (curve, u_curve, sigma))
+    if x is None or abs(x[0]) > half or abs(x[2]) > 2.5 * half or not x[4] - x[3] > 0.05:
         return None
-    return _side(fit, start, along, across, length, curved, len(value))
+    return _side(x, cov, sigma, u, n, value, free, start, along, across, length)
 
 
-def _side(fit: Any, start: Array, along: Array, across: Array, length: float, curved: bool, count: int) -> Side:
-    x = fit.x
-    dof = max(count - len(x), 1)
-    variance = 2 * fit.cost / dof
-    try:
-        full = np.linalg.inv(fit.jac.T @ fit.jac) * variance
-    except np.linalg.LinAlgError:
-        full = np.eye(len(x))
-    keep = [0, 1, 7] if curved else [0, 1]
-    own = np.zeros((3, 3))
-    own[: len(keep), : len(keep)] = full[np.ix_(keep, keep)]
-    p = np.array([x[0], x[1], x[7] if curved else 0.0])
-    # from u in -1..1 to t in 0..length: u = 2 t / length - 1
-    k = 2 / length
+def _fit(
+    x: Array, free: list[int], u: Array, n: Array, value: Array, assumed: tuple[float, float, float] | None
+) -> tuple[Array | None, Array, float]:
+    """Least squares over the free parameters: all of them, their covariance, and the residuals' standard deviation.
+
+    `assumed` is (exponent, its u, standard deviation of the pixels), where the exponent is free.
+    """
+    from scipy.optimize import least_squares
+
+    def whole(p: Array) -> Array:
+        full = x.copy()
+        full[free] = p
+        return full
+
+    scale = assumed[2] if assumed else 1.0
+
+    def residual(p: Array) -> Array:
+        r = (_edge(whole(p), u, n) - value) / scale
+        return np.append(r, (whole(p)[7] - assumed[0]) / assumed[1]) if assumed else r
+
+    def jacobian(p: Array) -> Array:
+        jac = _edge_jacobian(whole(p), u, n)[:, free] / scale
+        return np.vstack([jac, np.eye(9)[7, free] / assumed[1]]) if assumed else jac
+
+    fit = least_squares(residual, x[free], jac=jacobian, method="lm", max_nfev=60)
+    full = whole(fit.x)
+    if not np.all(np.isfinite(full)):
+        return None, np.eye(9), 1.0
+    dof = max(len(value) - len(free), 1)
+    sigma = max(float(np.sqrt(np.sum((_edge(full, u, n) - value) ** 2) / dof)), 1e-4)
+    cov = np.zeros((9, 9))
+    cov[np.ix_(free, free)] = np.linalg.pinv(fit.jac.T @ fit.jac) * (1.0 if assumed else sigma**2)
+    return full, cov, sigma
+
+
+def _side(
+    x: Array, cov: Array, sigma: float, u: Array, n: Array, value: Array, free: list[int], start: Array, along: Array,
+    across: Array, length: float,
+) -> Side:  # fmt: skip
+    keep = [0, 1, 8]
+    jac = _edge_jacobian(x, u, n)
+    by_curve = np.zeros(9)
+    by_curve[free] = -np.linalg.lstsq(jac[:, free], jac[:, 7], rcond=None)[0]
+    k = 2 / length  # from u in -1..1 to t in 0..length: u = k t - 1
     change = np.array([[1, -1, 1], [0, k, -2 * k], [0, 0, k * k]])
     contrast = float(x[4] - x[3])
-    return Side(start, along, across, change @ p, change @ own @ change.T, abs(float(x[2])), contrast, float(np.sqrt(variance)))
+    return Side(start, length * along, along, across, change @ x[keep], change @ cov[np.ix_(keep, keep)] @ change.T, contrast,
+                sigma / contrast, change @ by_curve[keep], float(x[7]), float(np.sqrt(cov[7, 7])))  # fmt: skip
 
 
 def _strip(light: Array, start: Array, along: Array, across: Array, length: float, half: float) -> tuple[Array, Array, Array]:
@@ -161,30 +233,38 @@ def _strip(light: Array, start: Array, along: Array, across: Array, length: floa
     return t.ravel()[picked], n.ravel()[picked], light[y0:y1, x0:x1].ravel()[picked]
 
 
-def _parts(x: Array, u: Array, n: Array) -> tuple[Array, Array, Array, Array, float]:
-    blur = np.hypot(x[2], 0.28)  # a pixel's own width blurs by 0.29 px
-    place = x[0] + x[1] * u + (x[7] * u * u if len(x) > 7 else 0.0)
-    z = (n - place) / blur
-    return z, x[3] + x[5] * u, x[4] + x[6] * u, np.exp(-z * z / 2) / np.sqrt(2 * np.pi), float(blur)
+_DARKEST = 1e-3
 
 
 def _edge(x: Array, u: Array, n: Array) -> Array:
+    """Encoded values of the model; x = a, b, blur, low, high, slopes of low and high, exponent, c."""
+    return _edge_parts(x, u, n)[0]
+
+
+def _edge_parts(x: Array, u: Array, n: Array) -> tuple[Array, ...]:
     from scipy.special import ndtr
 
-    z, low, high, _, _ = _parts(x, u, n)
-    return np.asarray(low + (high - low) * ndtr(z))
+    blur = np.hypot(x[2], PIXEL_BLUR)
+    z = (n - x[0] - x[1] * u - x[8] * u * u) / blur
+    low, high = np.maximum(x[3] + x[5] * u, _DARKEST), np.maximum(x[4] + x[6] * u, _DARKEST)
+    step, g = ndtr(z), float(np.clip(x[7], 0.5, 4.0))
+    low_light, high_light = low**g, high**g
+    light = low_light + (high_light - low_light) * step
+    return light ** (1 / g), z, step, low, high, low_light, high_light, light
 
 
 def _edge_jacobian(x: Array, u: Array, n: Array) -> Array:
-    from scipy.special import ndtr
-
-    z, low, high, density, blur = _parts(x, u, n)
-    step = ndtr(z)
-    slope = -(high - low) * density / blur
-    columns = [slope, slope * u, slope * z * x[2] / blur, 1 - step, step, (1 - step) * u, step * u]
-    if len(x) > 7:
-        columns.append(slope * u * u)
-    return np.stack(columns, -1)
+    """(samples, 9) derivatives of `_edge`."""
+    value, z, step, low, high, low_light, high_light, light = _edge_parts(x, u, n)
+    blur, g = np.hypot(x[2], PIXEL_BLUR), float(np.clip(x[7], 0.5, 4.0))
+    encode = value / (g * light)
+    by_place = -encode * (high_light - low_light) * np.exp(-z * z / 2) / np.sqrt(2 * np.pi) / blur
+    by_low = encode * g * low_light / low * (1 - step)
+    by_high = encode * g * high_light / high * step
+    light_by_g = low_light * np.log(low) * (1 - step) + high_light * np.log(high) * step
+    by_g = encode * light_by_g - value * np.log(light) / g**2
+    return np.stack([by_place, by_place * u, by_place * z * x[2] / blur, by_low, by_high, by_low * u, by_high * u, by_g,
+                     by_place * u * u], -1)  # fmt: skip
 
 
 def _corners(sides: list[Side], bends: Array) -> Array:
@@ -210,19 +290,19 @@ def _tangent(side: Side, bend: Array, t: float) -> Array:
     return np.asarray(side.along + (bend[1] + 2 * bend[2] * t) * side.across)
 
 
-def _corner_cov(sides: list[Side], corners: Array) -> Array:
-    """(8, 8) from the sides' covariances, the transfer curve (all sides out or in together) and the model's own sigma."""
+def _corner_cov(sides: list[Side], corners: Array, u_curve: float) -> Array:
+    """(8, 8) from the sides' covariances, the transfer curve (all sides together) and what the model leaves out."""
     bends = np.stack([side.bend for side in sides])
-    cov = np.eye(8) * MODEL_SIGMA_PX**2
+    cov = np.eye(8) * CORNER_SIGMA_PX**2
     for i, side in enumerate(sides):
-        sd = np.sqrt(np.diag(side.cov))
+        own = side.cov + np.diag([SIDE_SIGMA_PX**2, 0.0, 0.0])
+        sd = np.sqrt(np.diag(own))
         jac = np.zeros((8, 3))
         for j in np.flatnonzero(sd > 0):
             moved = bends.copy()
             moved[i, j] += sd[j]
             jac[:, j] = (_corners(sides, moved) - corners).ravel() / sd[j]
-        cov += jac @ side.cov @ jac.T
-    shifted = bends.copy()
-    shifted[:, 0] += [CURVE_SHIFT * side.blur_px for side in sides]
+        cov += jac @ own @ jac.T
+    shifted = bends + u_curve * np.stack([side.by_curve for side in sides])
     outward = (_corners(sides, shifted) - corners).ravel()
     return np.asarray(cov + np.outer(outward, outward))

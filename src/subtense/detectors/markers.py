@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ..distribution import Array
 from ..observation import Observation
 from ..photo import Photo
-from ..subpixel import linear_light, refine_quad
+from ..subpixel import encoded_gray, refine_quad
 
 FAMILIES: dict[str, tuple[str, int]] = {
     "36h11": ("DICT_APRILTAG_36h11", 8), "25h9": ("DICT_APRILTAG_25h9", 7), "36h10": ("DICT_APRILTAG_36h10", 8),
@@ -42,13 +42,13 @@ def markers(photo: Photo, family: str | None = None) -> tuple[Observation, ...]:
     import cv2
 
     gray = cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY)
-    light = linear_light(photo.pixels)
+    encoded = encoded_gray(photo.pixels)
     found: list[Observation] = []
     for name, number, corners in _candidates(cv2, gray, [family] if family else list(FAMILIES)):
         if any(_same_place(corners, other.points_px) for other in found):
             continue
         module = float(np.sqrt(_area(corners))) / FAMILIES[name][1]
-        quad = refine_quad(light, corners, module)
+        quad = refine_quad(encoded, corners, module)
         if quad is not None and quad.misfit < WORST_MISFIT:
             found.append(Observation(quad.corners_px, cov=quad.cov, label=f"{name} id {number}", source="edges of the marker"))
     return tuple(sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))

@@ -27,8 +27,10 @@ from ..observation import Observation
 from ..quantity import Note, Quantity
 from ..target import Target
 
-STEPS = 4
+STEPS = 2
 """Gauss-Newton steps of a moved scene from the nominal solution."""
+TELLING_RAD = math.radians(3.0)
+"""Two solutions whose faces differ by less are not called ambiguous."""
 LEAST_WEIGHT = 0.01
 """A second solution of less weight is left out."""
 
@@ -94,21 +96,48 @@ class Start:
             return 0.0
         return 1 / (1 + math.exp(min((self.chi2[1] - self.chi2[0]) / 2, 700.0)))
 
+    @property
+    def apart_rad(self) -> float:
+        """Angle between the faces of the two solutions."""
+        one, two = (pose.rotation[:, 2] for pose in self.poses[:2])
+        return float(np.arctan2(np.linalg.norm(np.cross(one, two)), one @ two))
+
 
 def start(inputs: Inputs) -> Start:
     """Solve the nominal scene; no pose at all leaves `poses` empty."""
-    seen = _normalised(inputs.camera, inputs.points)
+    points, seen = inputs.target.points_m, _normalised(inputs.camera, inputs.points)
     if not np.all(np.isfinite(seen)):
         return Start((), np.eye(seen.size), ())
     whiten = _whitening(inputs)
-    found = []
-    for pose in _closed_form(inputs.target.points_m, seen):
-        refined = _refined(pose, inputs.target.points_m, seen, whiten, 20)
-        residual = whiten @ (_seen_at(refined, inputs.target.points_m) - seen).reshape(-1)
-        if np.all(np.isfinite(residual)) and np.all(refined.apply(inputs.target.points_m)[..., 2] > 0):
-            found.append((float(residual @ residual), refined))
-    found.sort(key=lambda pair: pair[0])
-    return Start(tuple(p for _, p in found), whiten, tuple(c for c, _ in found))
+    found: list[tuple[float, Pose]] = []
+    for pose in _closed_form(points, seen):
+        for candidate in (pose, _mirrored(pose, points)):
+            refined = _refined(candidate, points, seen, whiten, 20)
+            residual = whiten @ (_seen_at(refined, points) - seen).reshape(-1)
+            chi2 = float(residual @ residual)
+            fits = np.isfinite(chi2) and np.all(refined.apply(points)[..., 2] > 0)
+            if fits and not any(_same(refined, other) for _, other in found):
+                found.append((chi2, refined))
+    best = sorted(found, key=lambda pair: pair[0])[:2]
+    return Start(tuple(p for _, p in best), whiten, tuple(c for c, _ in best))
+
+
+def _same(one: Pose, other: Pose) -> bool:
+    return bool(np.allclose(one.rotation, other.rotation, atol=1e-6))
+
+
+def _mirrored(pose: Pose, points_m: Array) -> Pose:
+    """The pose with the target's face mirrored about the line of sight: near the second solution of a flat target."""
+    middle = points_m.mean(axis=0)
+    place = pose.rotation @ middle + pose.translation_m
+    sight, face = place / np.linalg.norm(place), pose.rotation[:, 2]
+    across = np.cross(face, sight)
+    if face @ sight < 0:
+        across = -across
+    size = np.linalg.norm(across)
+    angle = 2 * math.atan2(size, abs(face @ sight))
+    rotation = rotation_from_vector(across / size * angle if size > 1e-12 else np.zeros(3)) @ pose.rotation
+    return Pose(rotation, place - rotation @ middle)
 
 
 def _normalised(camera: Camera, points: Observation) -> Array:
@@ -134,15 +163,16 @@ def _closed_form(points_m: Array, seen: Array) -> list[Pose]:
         raise InputError("target", "points on one line", "give at least four points that span a plane")
     flat = spread[2] < 1e-9 * spread[0]
     turn = _to_plane(centred) if flat else np.eye(3)
-    flags = cv2.SOLVEPNP_IPPE if flat else cv2.SOLVEPNP_SQPNP
-    try:
-        _, vectors, shifts, _ = cv2.solvePnPGeneric(centred @ turn.T, seen, np.eye(3), None, flags=flags)
-    except cv2.error:
-        return []
     poses = []
-    for vector, shift in zip(vectors, shifts, strict=True):
-        rotation = rotation_from_vector(np.reshape(vector, 3)) @ turn
-        poses.append(Pose(rotation, np.reshape(shift, 3) - rotation @ points_m.mean(axis=0)))
+    # IPPE fails where a flat target exactly faces the camera; the iterative solver starts from a homography
+    for flags in ((cv2.SOLVEPNP_IPPE, cv2.SOLVEPNP_ITERATIVE) if flat else (cv2.SOLVEPNP_SQPNP,)):
+        try:
+            _, vectors, shifts, _ = cv2.solvePnPGeneric(centred @ turn.T, seen, np.eye(3), None, flags=flags)
+        except cv2.error:
+            continue
+        for vector, shift in zip(vectors, shifts, strict=True):
+            rotation = rotation_from_vector(np.reshape(vector, 3)) @ turn
+            poses.append(Pose(rotation, np.reshape(shift, 3) - rotation @ points_m.mean(axis=0)))
     return [pose for pose in poses if np.all(np.isfinite(pose.rotation)) and np.all(np.isfinite(pose.translation_m))]
 
 
@@ -240,7 +270,7 @@ def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
     """`pose_ambiguous` and `close_focus`."""
     begin = start(inputs)
     found = []
-    if begin.weight >= LEAST_WEIGHT:
+    if begin.weight >= LEAST_WEIGHT and begin.apart_rad > TELLING_RAD:
         other = _numbers(begin.poses[1], inputs, _normalised(inputs.camera, inputs.points), begin.whiten)
         text = (f"a second pose fits nearly as well (probability {begin.weight:.0%}): tilt {math.degrees(float(other[2])):.0f}° "
                 "the other way").replace("%)", " %)")  # fmt: skip
@@ -276,6 +306,7 @@ METHOD = Method(
     example=example,
     start=start,
     prepare=prepare,
+    most_draws=100_000,
     notes=notes,
 )  # fmt: skip
 
