@@ -252,13 +252,13 @@ def street_ground(scene: rs.Scene) -> list[Thing]:
     paint = rs.matte(rs.image(tx.mottled((256, 256), "dcdad2", (12, 12), 72, 0.06)))
     stripes = []
     for index, x in enumerate(np.arange(-2.75, 3.0, 1.0)):
-        stripe, corners = rs.flat((x, 8.0, 0.002), 0.5, 3.0, 0.0, paint)
+        stripe, corners = rs.flat((x, 8.0, 0.0003), 0.5, 3.0, 0.0, paint)
         scene.add(stripe)
         size = {"width": 0.5, "length": 3.0}
         stripes.append(quad(f"stripe_{index}", "painted stripe on the road", size, corners,
                             index != 1))  # fmt: skip
     for y in np.arange(12.5, 80, 6.0):
-        scene.add(rs.flat((-0.95, y, 0.002), 0.12, 2.5, 0.0, paint)[0])
+        scene.add(rs.flat((-0.95, y, 0.0003), 0.12, 2.5, 0.0, paint)[0])
     stone = rs.matte(rs.image(tx.slabs(512, 1, 73, "b0aca4"), (1, 60)))
     paving = rs.matte(rs.image(tx.slabs(1024, 8, 74, "9a958c"), (0.8, 24)))
     for side in (-1, 1):
@@ -377,7 +377,7 @@ def add_van(scene: rs.Scene, left: float, y: float) -> list[Thing]:
         for axle in (y + 0.75, back - 0.8):
             disc = [(x - 0.1, axle, 0.30), (x, axle, 0.30), (x + 0.1, axle, 0.30)]
             scene.add(wheel(disc, 0.30, dark))
-    e = y - 0.002
+    e = y - 0.0003
 
     def decal(x0, x1, z0, z1, material):
         scene.add(rs.panel((left + x0, e, z1), (left + x1, e, z1), (left + x0, e, z0), material))
@@ -388,7 +388,7 @@ def add_van(scene: rs.Scene, left: float, y: float) -> list[Thing]:
     decal(0.0, 1.80, 0.30, 0.46, rs.matte(0.05))
     decal(0.86, 0.94, 0.84, 0.88, rs.matte(0.5))
     decal(0.62, 0.66, 0.95, 1.10, rs.matte(0.015))
-    e = y - 0.004
+    e = y - 0.0006
     decal(0.64, 1.16, 0.58, 0.69, rs.matte(tx.rgb("ece8da")))
     corners = np.array([(left, y, top), (right, y, top), (right, y, bottom), (left, y, bottom)])
     plate = np.array([(left + a, e, b) for a, b in ((0.64, 0.69), (1.16, 0.69), (1.16, 0.58),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
@@ -38,6 +38,7 @@ class Camera(Noun):
         source: where it comes from.
         nominal_focal_m: the physical focal length, given only where f_px stands for focus at infinity (metadata,
             preset, typed in); None for a calibrated camera, whose f_px already holds the focus extension.
+        part_sources: where single lines come from, by their name in the budget ("principal point"), if not from `source`.
         id: given, or the digest of the content.
     """
 
@@ -52,6 +53,7 @@ class Camera(Noun):
     cov: Array | None = None
     source: str = "stated"
     nominal_focal_m: float | None = None
+    part_sources: Mapping[str, str] = field(default_factory=dict)
     id: str | None = None
 
     widget: ClassVar[str] = "camera"
@@ -245,7 +247,7 @@ class Camera(Noun):
         for _, first, last in _GROUPS:
             moving = [i for i in range(first, last or len(self.cov)) if self.cov[i, i] > 0]
             tied = [g for g in groups if np.any(self.cov[np.ix_(g, moving)])]
-            groups = [g for g in groups if g not in tied] + ([sum(tied, []) + moving] if moving else [])
+            groups = [g for g in groups if g not in tied] + ([[i for g in tied for i in g] + moving] if moving else [])
         return groups
 
     def _part(self, group: list[int], vector: Array) -> Part:
@@ -254,7 +256,8 @@ class Camera(Noun):
         cov = self.cov[np.ix_(group, group)]
         diagonal = not np.any(cov - np.diag(np.diag(cov)))
         u = np.sqrt(np.diag(cov)).reshape(-1, *(1,) * (vector.ndim - 1))
-        return Part(",".join(map(str, group)), ", ".join(names), self.source, vector[group],
+        source = "; ".join(dict.fromkeys(self.part_sources.get(name, self.source) for name in names))
+        return Part(",".join(map(str, group)), ", ".join(names), source, vector[group],
                     u if diagonal else None, None if diagonal else cov)  # fmt: skip
 
     def moved(self, values: Mapping[str, Array]) -> Self:
@@ -276,7 +279,7 @@ class Camera(Noun):
             "width_px": self.width_px, "height_px": self.height_px, "lens": self.lens, "f_px": plain(self.f_px),
             "aspect": plain(self.aspect), "cx_px": plain(self.cx_px), "cy_px": plain(self.cy_px),
             "distortion": self.coefficients.tolist(), "cov": None if self.cov is None else self.cov.tolist(),
-            "source": self.source, "nominal_focal_m": self.nominal_focal_m,
+            "source": self.source, "nominal_focal_m": self.nominal_focal_m, "part_sources": dict(self.part_sources),
         }  # fmt: skip
         return {**data, "id": self.id} if self.id else data
 

@@ -14,7 +14,6 @@ from .errors import SubtenseError
 
 if TYPE_CHECKING:
     from .document import Document
-    from .quantity import Quantity
 
 
 class _Group(click.Group):
@@ -57,15 +56,9 @@ def _output_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _show(document: Document, form: str) -> None:
-    from .workflow.tables import report_of
+    from .workflow.report_of import report_of
 
     click.echo(report_of(form)(document))
-
-
-def _read(text: str | None, unit: str, bare: str, name: str, assume: Callable[[float, float], Quantity]) -> Quantity | None:
-    from .quantity import Quantity
-
-    return None if text is None else Quantity.parse(text, unit, bare=bare, name=name, assume=assume)
 
 
 @main.command(epilog="Example: subtense calc --focal 35 --sensor-width 14.1 --image-width 4096 --size 200 --extent 150")
@@ -82,7 +75,9 @@ def _read(text: str | None, unit: str, bare: str, name: str, assume: Callable[[f
 @click.option("--along", type=click.Choice(["width", "height"]), default="width", show_default=True,
               help="Which way the extent was measured.")  # fmt: skip
 @click.option("--aspect", metavar="RATIO", help="Pixel width over pixel height.  [default: 1]")
-@click.option("--tilt", metavar="ANGLE", help='Of the object to the image plane, as "0 ± 20 deg (limits)".  [default: 0]')
+@click.option(
+    "--tilt", metavar="ANGLE", help='Of the object to the image plane, as "0 ± 20 deg (limits)".  [default: 0]'
+)
 @click.option("--offset", metavar="X,Y", help="Of the object's middle from the picture's, px.  [default: 0,0]")
 @_output_options
 def calc(form: str, level: float, seed: int, **text: str | None) -> None:
@@ -90,11 +85,61 @@ def calc(form: str, level: float, seed: int, **text: str | None) -> None:
 
     Leave out --distance, --size, --extent or --focal. What is said without ± gets an honest default, marked "assumed".
     """
-    from .workflow.calculator_input import calculator_input
     from .workflow.calculate import calculate
+    from .workflow.calculator_input import calculator_input
 
     inputs, image_height = calculator_input(text)
     _show(calculate(inputs, image_height=image_height, level=level, seed=seed), form)
+
+
+@main.command()
+@click.argument("photo", type=click.Path(path_type=Path))
+@click.option("--camera", metavar="CAMERA", help="What is known of it; see `subtense measure --help`.")
+@click.option("--format", "form", default="text", show_default=True, help="text, json or csv.")
+def camera(photo: Path, camera: str | None, form: str) -> None:
+    """Which camera took PHOTO, by every source: what was chosen, why, and what the others say."""
+    from .photo import Photo
+    from .workflow.measure import camera_document
+
+    _show(camera_document(Photo.load(photo), camera), form)
+
+
+@main.command(epilog="Example: subtense measure examples/desk.jpg --marker-size '50 mm' --overlay out.png")
+@click.argument("photo", type=click.Path(path_type=Path))
+@click.option(
+    "--line", "lines", multiple=True, metavar="X1,Y1,X2,Y2", help="Two ends of an object, px; may be repeated."
+)
+@click.option(
+    "--size", "sizes", multiple=True, metavar="LENGTH", help="Its real size, mm if bare; one for all lines or one each."
+)
+@click.option("--tilt", metavar="ANGLE", help='Of the object to the image plane.  [default: "0 ± 20 deg (limits)"]')
+@click.option(
+    "--marker-size", metavar="LENGTH", help="Find ArUco and AprilTag markers; side of the black square, mm if bare."
+)
+@click.option("--marker-family", metavar="NAME", help="Look for this family only, as 36h11 or 4x4.")
+@click.option("--camera", metavar="CAMERA", help='A calibration file, "f=1500px", "f=35mm,sensor=14.1mm", "fov=70deg", or a preset.'
+              "  [default: from the photo's metadata]")  # fmt: skip
+@click.option("--overlay", type=click.Path(path_type=Path), help="Write the photo with the result drawn on it.")
+@_output_options
+def measure(photo: Path, lines: tuple[str, ...], sizes: tuple[str, ...], tilt: str | None, marker_size: str | None,
+            marker_family: str | None, camera: str | None, overlay: Path | None, form: str, level: float, seed: int) -> None:  # fmt: skip
+    """Measure in PHOTO: objects of known size by their ends, or markers by themselves.
+
+    Pixel (0, 0) is the centre of the top-left pixel of the upright picture.
+    """
+    from .photo import Photo
+    from .workflow.measure_input import measure_document
+    from .workflow.report_of import report_of
+
+    report_of(form)
+    picture = Photo.load(photo)
+    document = measure_document(picture, lines=lines, sizes=sizes, tilt=tilt, marker_size=marker_size,
+                                marker_family=marker_family, camera=camera, level=level, seed=seed)  # fmt: skip
+    if overlay is not None:
+        from .reports.overlay import write
+
+        write(document, picture, overlay)
+    _show(document, form)
 
 
 @main.command()
@@ -104,4 +149,6 @@ def presets(words: tuple[str, ...]) -> None:
     from .presets import presets as table
     from .reports.table import preset_table
 
-    click.echo(preset_table([p for p in table().values() if all(w.lower() in f"{p.name} {p.title}".lower() for w in words)]))
+    click.echo(
+        preset_table([p for p in table().values() if all(w.lower() in f"{p.name} {p.title}".lower() for w in words)])
+    )

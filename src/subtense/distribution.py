@@ -143,9 +143,7 @@ def _trapezoid_kurtosis(d: float) -> float:
 
 LAWS: dict[str, Law] = {
     "normal": Law(lambda r, n, _: r.standard_normal(n), lambda p, _: normal_quantile(p), lambda _: 0.0),
-    "uniform": Law(
-        lambda r, n, _: r.uniform(-_ROOT3, _ROOT3, n), lambda p, _: _ROOT3 * (2 * p - 1), lambda _: -1.2
-    ),
+    "uniform": Law(lambda r, n, _: r.uniform(-_ROOT3, _ROOT3, n), lambda p, _: _ROOT3 * (2 * p - 1), lambda _: -1.2),
     "triangular": Law(
         lambda r, n, _: math.sqrt(6.0) * (r.random(n) - r.random(n)), _triangular_quantile, lambda _: -0.6
     ),
@@ -161,11 +159,10 @@ LAWS: dict[str, Law] = {
     ),
     "curvilinear_trapezoid": Law(_draw_trapezoid, _trapezoid_quantile, _trapezoid_kurtosis),
     "either": Law(
-        lambda r, n, p: (r.random(n) < p) / math.sqrt(p), lambda q, p: 0.0 if q < 1 - p else 1 / math.sqrt(p),
+        lambda r, n, p: (r.random(n) < p) / math.sqrt(p),
+        lambda q, p: 0.0 if q < 1 - p else 1 / math.sqrt(p),
         lambda p: (1 - 6 * p * (1 - p)) / (p * (1 - p)),
     ),
-    "one_sided": Law(
-        lambda r, n, side: side * _ROOT3 * r.random(n), _one_sided_quantile, lambda _: -1.2
-    ),
+    "one_sided": Law(lambda r, n, side: side * _ROOT3 * r.random(n), _one_sided_quantile, lambda _: -1.2),
 }
 NORMAL = Distribution()

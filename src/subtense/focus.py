@@ -33,5 +33,7 @@ def close_focus(focal_m: float | None, depth_m: float, focus: Quantity) -> Note 
     if added:
         text += f"{added * 1000:.3g} mm of thin-lens extension are added"
     else:
-        text += f"a thin lens would put the object at {(depth_m + focal_m) * 1000:.2f} mm from its front principal plane"
+        text += (
+            f"a thin lens would put the object at {(depth_m + focal_m) * 1000:.2f} mm from its front principal plane"
+        )
     return Note("close_focus", text, "calibrate the camera at this focus")

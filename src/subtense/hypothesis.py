@@ -38,6 +38,12 @@ class Hypothesis:
         return self.camera.u_f_px / float(self.camera.f_px) if self.camera else math.inf
 
 
+_ASSUMED = {
+    "principal point": f"assumed: the middle of the picture, to {UNKNOWN_CENTRE:.0%} of its width".replace("%", " %"),
+    "lens distortion": f"assumed: none, k1 to {UNKNOWN_K1}",
+}
+
+
 def unknown_lens(
     width_px: int, height_px: int, f_px: float, u_f_px: float, source: str, nominal_focal_m: float | None = None
 ) -> Camera:
@@ -49,7 +55,7 @@ def unknown_lens(
     centre = UNKNOWN_CENTRE * max(width_px, height_px)
     cov[[0, 2, 3, 4], [0, 2, 3, 4]] = u_f_px**2, centre**2, centre**2, UNKNOWN_K1**2
     return Camera(width_px, height_px, f_px, (width_px - 1) / 2, (height_px - 1) / 2, lens="brown_conrady", cov=cov,
-                  source=source, nominal_focal_m=nominal_focal_m)  # fmt: skip
+                  source=source, nominal_focal_m=nominal_focal_m, part_sources=_ASSUMED)  # fmt: skip
 
 
 def scaled_to(camera: Camera, photo: Photo) -> tuple[Camera, tuple[Note, ...]] | str:

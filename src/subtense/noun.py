@@ -10,7 +10,6 @@ from __future__ import annotations
 import abc
 import copy
 import dataclasses
-import hashlib
 import json
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
@@ -68,6 +67,8 @@ class Noun(abc.ABC):
     @property
     def digest(self) -> str:
         """Twelve hexadecimal digits of a hash of the noun's JSON."""
+        import hashlib  # slow to import, and a calculator needs no digests
+
         text = json.dumps(self.to_json(), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 

@@ -222,7 +222,7 @@ def _metadata(picture: Any) -> tuple[Metadata, tuple[Note, ...]]:
         notes = (Note("orientation_invalid", f"the orientation tag is {str(orientation)[:20]!r}, not 1 to 8; the picture is "
                       "taken as it is stored", "check that it is upright"),)  # fmt: skip
         orientation = 1
-    per_mm = {2: 1 / 25.4, 3: 0.1, 4: 1.0, 5: 1000.0}.get(tags.get(0xA210, 2), None)
+    per_mm = {2: 1 / 25.4, 3: 0.1, 4: 1.0, 5: 1000.0}.get(tags.get(0xA210, 2))
     return Metadata(
         make=_text(tags.get(0x010F)), model=_text(tags.get(0x0110)), lens=_text(tags.get(0xA434)),
         focal_mm=_positive(tags.get(0x920A)), f35_mm=_positive(tags.get(0xA405)),

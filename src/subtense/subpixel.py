@@ -12,7 +12,6 @@ Source: the blurred-edge model of W. Förstner and B. Wrobel, Photogrammetric Co
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -76,7 +75,7 @@ class Side:
     def tells_curve(self) -> bool:
         """Whether the side crosses pixels at many places; one along a row shows a single phase, and no asymmetry."""
         slope = float(abs(self.along).min()) + abs(self.bend[1])
-        return slope * float(np.hypot(*self.extent)) > 2.0
+        return bool(slope * float(np.hypot(*self.extent)) > 2.0)
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,9 @@ def refine_quad(gray: Array, corners_px: Array, module_px: float) -> Quad | None
     if sides is None:
         return None
     # the sides share one curve: theirs, averaged with the assumed one, which each of them already holds
-    weight = np.array([side.tells_curve * (1 / side.u_curve**2 - 1 / CURVE_U**2) for side in sides]).clip(0.0, LEAST_CURVE_U**-2)
+    weight = np.array([side.tells_curve * (1 / side.u_curve**2 - 1 / CURVE_U**2) for side in sides]).clip(
+        0.0, LEAST_CURVE_U**-2
+    )
     u_curve = float((weight.sum() + 1 / CURVE_U**2) ** -0.5)
     own = np.array([side.curve for side in sides])
     own = CURVE + (own - CURVE) * (weight + 1 / CURVE_U**2) / np.maximum(weight, 1e-9)  # without the assumption
@@ -155,19 +156,19 @@ def fit_side(
     if not high - low > 0.05:
         return None
     u = 2 * t / length - 1  # -1 to 1 along the side, for a well-conditioned fit
-    x = np.array([0.0, 0.0, 0.6, low, high, 0.0, 0.0, curve, 0.0])
+    begin = np.array([0.0, 0.0, 0.6, low, high, 0.0, 0.0, curve, 0.0])
     free = [0, 1, 2, 3, 4, 5, 6] + ([8] if length > CURVED_FROM_PX else [])
-    x, cov, sigma = _fit(x, free, u, n, value, None)
-    if u_curve is not None and x is not None:
+    x, cov, sigma = _fit(begin, free, u, n, value, None)
+    if u_curve is not None and np.all(np.isfinite(x)):
         x, cov, sigma = _fit(x, [*free, 7], u, n, value, (curve, u_curve, sigma))
-    if x is None or abs(x[0]) > half or abs(x[2]) > 2.5 * half or not x[4] - x[3] > 0.05:
+    if not np.all(np.isfinite(x)) or abs(x[0]) > half or abs(x[2]) > 2.5 * half or not x[4] - x[3] > 0.05:
         return None
-    return _side(x, cov, sigma, u, n, value, free, start, along, across, length)
+    return _side(x, cov, sigma, u, n, free, start, along, across, length)
 
 
 def _fit(
     x: Array, free: list[int], u: Array, n: Array, value: Array, assumed: tuple[float, float, float] | None
-) -> tuple[Array | None, Array, float]:
+) -> tuple[Array, Array, float]:
     """Least squares over the free parameters: all of them, their covariance, and the residuals' standard deviation.
 
     `assumed` is (exponent, its u, standard deviation of the pixels), where the exponent is free.
@@ -192,7 +193,7 @@ def _fit(
     fit = least_squares(residual, x[free], jac=jacobian, method="lm", max_nfev=60)
     full = whole(fit.x)
     if not np.all(np.isfinite(full)):
-        return None, np.eye(9), 1.0
+        return full, np.eye(9), 1.0
     dof = max(len(value) - len(free), 1)
     sigma = max(float(np.sqrt(np.sum((_edge(full, u, n) - value) ** 2) / dof)), 1e-4)
     cov = np.zeros((9, 9))
@@ -201,7 +202,7 @@ def _fit(
 
 
 def _side(
-    x: Array, cov: Array, sigma: float, u: Array, n: Array, value: Array, free: list[int], start: Array, along: Array,
+    x: Array, cov: Array, sigma: float, u: Array, n: Array, free: list[int], start: Array, along: Array,
     across: Array, length: float,
 ) -> Side:  # fmt: skip
     keep = [0, 1, 8]
@@ -215,7 +216,9 @@ def _side(
                 sigma / contrast, change @ by_curve[keep], float(x[7]), float(np.sqrt(cov[7, 7])))  # fmt: skip
 
 
-def _strip(light: Array, start: Array, along: Array, across: Array, length: float, half: float) -> tuple[Array, Array, Array]:
+def _strip(
+    light: Array, start: Array, along: Array, across: Array, length: float, half: float
+) -> tuple[Array, Array, Array]:
     """Pixels of a strip along a side but for its ends: place along, place across, luminance."""
     margin = min(max(1.5 * half, 0.08 * length), 0.3 * length)
     ends = np.array([start + margin * along, start + (length - margin) * along])

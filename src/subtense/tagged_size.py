@@ -38,7 +38,8 @@ def tagged_size(photo: Photo) -> TaggedSize:
     u = 0.0
     if zoom > 1:
         u = ZOOMED_U
-        notes = (Note("digital_zoom", f"taken with a digital zoom of {zoom:g}; the focal length is corrected by it where its tag does not hold it",
+        notes = (Note("digital_zoom", f"taken with a digital zoom of {zoom:g}; the focal length is corrected by it where "
+                "its tag does not hold it",
                       "take the picture without digital zoom"),)  # fmt: skip
     if not tags.tagged_width_px or not tags.tagged_height_px:
         return TaggedSize(1.0, zoom, u, notes)

@@ -37,7 +37,9 @@ def read(path: Path) -> Camera:
     try:
         data: Any = json.loads(path.read_text("utf-8"))
     except (ValueError, RecursionError):
-        raise FileFormatError(path, "is not JSON; give a camera as `subtense camera PHOTO --format json` prints it") from None
+        raise FileFormatError(
+            path, "is not JSON; give a camera as `subtense camera PHOTO --format json` prints it"
+        ) from None
     if isinstance(data, dict) and isinstance(data.get("camera"), dict):
         data = data["camera"]
     if not isinstance(data, dict):

@@ -31,13 +31,18 @@ def camera(photo: Photo) -> Hypothesis:
     if f35 is None:
         return Hypothesis(NAME, None, "the metadata has no 35 mm equivalent focal length")
     if not 4 <= f35 <= 2000 or (tags.focal_mm and not 0.8 <= f35 / tags.focal_mm <= 12):
-        note = Note("f35_invalid", f"the 35 mm equivalent of {f35:g} mm is absurd and was left out", "give the camera with --camera")
+        note = Note(
+            "f35_invalid",
+            f"the 35 mm equivalent of {f35:g} mm is absurd and was left out",
+            "give the camera with --camera",
+        )
         return Hypothesis(NAME, None, f"the 35 mm equivalent of {f35:g} mm is absurd", (note,))
     size = tagged_size(photo)
     diagonal, relative_shape, notes = _diagonal(photo)
     f_px = f35 * diagonal / DIAGONAL_MM
-    relative = math.hypot(NOMINAL_FOCAL, MAKERS_RULE, 0.5 / math.sqrt(3) / f35, relative_shape, size.relative_u,
-                          1 - 1 / size.zoom)
+    relative = math.hypot(
+        NOMINAL_FOCAL, MAKERS_RULE, 0.5 / math.sqrt(3) / f35, relative_shape, size.relative_u, 1 - 1 / size.zoom
+    )
     text = f"EXIF: 35 mm equivalent of {f35:g} mm, by the diagonal"
     focal_m = tags.focal_mm / 1000 if tags.focal_mm else None
     found = unknown_lens(photo.width_px, photo.height_px, f_px, relative * f_px, text, focal_m)

@@ -28,7 +28,9 @@ def camera(photo: Photo) -> Hypothesis:
     size = tagged_size(photo)
     width = (tags.tagged_width_px or photo.stored_size_px[0]) / tags.focal_plane_x_per_mm
     if not SENSOR_WIDTHS_MM[0] <= width <= SENSOR_WIDTHS_MM[1]:
-        return Hypothesis(NAME, None, f"the focal-plane resolution makes the sensor {width:.2g} mm wide: it is of another size")
+        return Hypothesis(
+            NAME, None, f"the focal-plane resolution makes the sensor {width:.2g} mm wide: it is of another size"
+        )
     x, y = tags.focal_plane_x_per_mm, tags.focal_plane_y_per_mm or tags.focal_plane_x_per_mm
     f_px = tags.focal_mm * math.sqrt(x * y) * size.scale * size.zoom
     relative = math.hypot(NOMINAL_FOCAL, (x / y - 1) / 2, _rounding(tags.focal_mm), size.relative_u)
@@ -40,4 +42,3 @@ def camera(photo: Photo) -> Hypothesis:
 def _rounding(focal_mm: float) -> float:
     """Relative u by the rounding of the tag, taken to a tenth of a millimetre below 20 mm and to one above."""
     return (0.05 if focal_mm < 20 else 0.5) / math.sqrt(3) / focal_mm
-

@@ -50,17 +50,22 @@ def _from_pairs(text: str, photo: Photo) -> Camera:
     if set(said) == {"sensor"}:
         sensor = Quantity.parse(said["sensor"], "m", bare="mm", name="--camera sensor", assume=assumptions.sensor_width)
         return _from_lengths(_tagged_focal(text, photo), sensor, photo, "sensor width as stated, EXIF focal length")
-    raise InputError("--camera", text, "write f=1500px, or f=35mm,sensor=14.1mm, or fov=70deg; a focal length in mm needs the sensor")
+    raise InputError(
+        "--camera", text, "write f=1500px, or f=35mm,sensor=14.1mm, or fov=70deg; a focal length in mm needs the sensor"
+    )
 
 
 def _from_pixels(text: str, photo: Photo) -> Camera:
     """A focal length in pixels is a calibrated one: without ± it is taken to 0.5 %."""
+
     def assume(value: float, _: float) -> Quantity:
         return Quantity.normal(value, 0.005 * value, "px", "assumed: 0.5 %")
 
     f = Quantity.parse(text, "px", name="--camera f", assume=assume)
     _above_zero("--camera f", f, text)
-    made = unknown_lens(photo.width_px, photo.height_px, float(f.value), float(f.u), f"focal length in pixels, {f.source}")
+    made = unknown_lens(
+        photo.width_px, photo.height_px, float(f.value), float(f.u), f"focal length in pixels, {f.source}"
+    )
     return made
 
 
@@ -88,16 +93,22 @@ def _from_lengths(focal: Quantity, sensor: Quantity, photo: Photo, source: str) 
 
 def _tagged_focal(text: str, photo: Photo) -> Quantity:
     if photo.metadata.focal_mm is None:
-        raise InputError("--camera", text, "the photo's metadata has no focal length; add it, as in f=35mm,sensor=14.1mm")
+        raise InputError(
+            "--camera", text, "the photo's metadata has no focal length; add it, as in f=35mm,sensor=14.1mm"
+        )
     return assumptions.focal_length(photo.metadata.focal_mm / 1000, 5e-5)
 
 
 def _from_preset(text: str, photo: Photo) -> Camera:
     preset = find_preset(text)
     if preset.focal_length is None:
-        made = _from_lengths(_tagged_focal(text, photo), preset.sensor_width, photo, f"preset {preset.name}, EXIF focal length")
+        made = _from_lengths(
+            _tagged_focal(text, photo), preset.sensor_width, photo, f"preset {preset.name}, EXIF focal length"
+        )
     else:
-        made = _from_lengths(preset.focal_length, preset.sensor_width, photo, f"preset {preset.name}: the range of its class")
+        made = _from_lengths(
+            preset.focal_length, preset.sensor_width, photo, f"preset {preset.name}: the range of its class"
+        )
     return replace(made, id=None)
 
 

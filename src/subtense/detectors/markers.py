@@ -50,7 +50,9 @@ def markers(photo: Photo, family: str | None = None) -> tuple[Observation, ...]:
         module = float(np.sqrt(_area(corners))) / FAMILIES[name][1]
         quad = refine_quad(encoded, corners, module)
         if quad is not None and quad.misfit < WORST_MISFIT:
-            found.append(Observation(quad.corners_px, cov=quad.cov, label=f"{name} id {number}", source="edges of the marker"))
+            found.append(
+                Observation(quad.corners_px, cov=quad.cov, label=f"{name} id {number}", source="edges of the marker")
+            )
     return tuple(sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))
 
 

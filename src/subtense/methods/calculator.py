@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..distribution import Array
 from ..assumptions import frontal
+from ..distribution import Array
 from ..focus import classical, close_focus
 from ..geometry import segment_depth
 from ..method import Method, Output, Reason, Reasons, reasons
@@ -178,7 +178,12 @@ def calculator(inputs: Inputs) -> Result:
         solved = _SOLVERS[unknown](s)
         focal, size, extent, distance = (
             solved if name == unknown else known
-            for name, known in (("focal_length", s.focal), ("size", s.size), ("extent", s.extent), ("distance", s.distance))
+            for name, known in (
+                ("focal_length", s.focal),
+                ("size", s.size),
+                ("extent", s.extent),
+                ("distance", s.distance),
+            )
         )
         assert focal is not None and size is not None and extent is not None and distance is not None
         f = focal / s.pitch

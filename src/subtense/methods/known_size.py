@@ -13,15 +13,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..assumptions import frontal
 from ..camera import Camera
 from ..distribution import Array
-from ..assumptions import frontal
 from ..focus import close_focus, thin_lens
 from ..geometry import segment_depth
 from ..lenses import LENSES
 from ..method import Method, Output, Reason, Reasons, reasons
 from ..observation import Observation
 from ..quantity import Note, Quantity
+
 
 @dataclass(frozen=True)
 class Inputs:

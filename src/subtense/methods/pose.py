@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -165,7 +164,7 @@ def _closed_form(points_m: Array, seen: Array) -> list[Pose]:
     turn = _to_plane(centred) if flat else np.eye(3)
     poses = []
     # IPPE fails where a flat target exactly faces the camera; the iterative solver starts from a homography
-    for flags in ((cv2.SOLVEPNP_IPPE, cv2.SOLVEPNP_ITERATIVE) if flat else (cv2.SOLVEPNP_SQPNP,)):
+    for flags in (cv2.SOLVEPNP_IPPE, cv2.SOLVEPNP_ITERATIVE) if flat else (cv2.SOLVEPNP_SQPNP,):
         try:
             _, vectors, shifts, _ = cv2.solvePnPGeneric(centred @ turn.T, seen, np.eye(3), None, flags=flags)
         except cv2.error:
@@ -204,7 +203,7 @@ def _refined(pose: Pose, points_m: Array, seen: Array, whiten: Array, steps: int
         normal = np.swapaxes(weighted, -1, -2) @ weighted
         gradient = np.swapaxes(weighted, -1, -2) @ (whiten @ residual[..., None])
         damp = 1e-12 * np.trace(normal, axis1=-2, axis2=-1)[..., None, None] * np.eye(6)
-        step = -np.linalg.solve(np.nan_to_num(normal + damp, nan=1.0, posinf=1.0) , np.nan_to_num(gradient))[..., 0]
+        step = -np.linalg.solve(np.nan_to_num(normal + damp, nan=1.0, posinf=1.0), np.nan_to_num(gradient))[..., 0]
         rotation = rotation_from_vector(step[..., :3]) @ rotation
         shift = shift + step[..., 3:]
     return Pose(rotation, shift)
@@ -231,13 +230,13 @@ def pose(inputs: Inputs, begin: Start) -> Result:
         return Result(nothing, nothing, nothing, np.full(lead, Reason.NOT_CONVERGED, np.int8))
     seen = _normalised(inputs.camera, inputs.points)
     share = np.asarray(inputs.ambiguity.value)
-    numbers = _numbers(begin.poses[0], inputs, seen, begin.whiten)
+    numbers = list(_numbers(begin.poses[0], inputs, seen, begin.whiten))
     if len(begin.poses) > 1 and (np.any(share) or np.any(inputs.ambiguity.u)):
         other = _numbers(begin.poses[1], inputs, seen, begin.whiten)
-        numbers = tuple((1 - share) * a + share * b for a, b in zip(numbers, other, strict=True))
+        numbers = [(1 - share) * a + share * b for a, b in zip(numbers, other, strict=True)]
     range_m, depth_m, tilt = (np.broadcast_to(n, lead) for n in numbers)
     perspective = np.asarray(not LENSES[inputs.camera.lens].perspective)
-    code = reasons(lead, (perspective, Reason.NOT_PINHOLE), (~np.isfinite(seen).all(axis=(-1, -2)), Reason.NOT_INVERTIBLE),
+    code = reasons(lead, (perspective, Reason.NOT_PINHOLE), (np.asarray(~np.isfinite(seen).all(axis=(-1, -2))), Reason.NOT_INVERTIBLE),
                    (~np.isfinite(range_m), Reason.NOT_CONVERGED), (~(depth_m > 0), Reason.BEHIND_CAMERA))  # fmt: skip
     return Result(range_m, depth_m, tilt, code)
 
@@ -311,7 +310,7 @@ METHOD = Method(
 )  # fmt: skip
 
 
-def solution(inputs: Inputs) -> Any:
+def solution(inputs: Inputs) -> Pose | None:
     """camera_from_target of the nominal scene with its (6, 6) covariance from the points, or None."""
     begin = start(inputs)
     if not begin.poses:
@@ -320,4 +319,4 @@ def solution(inputs: Inputs) -> Any:
     turned = inputs.target.points_m @ best.rotation.T
     placed = turned + best.translation_m
     weighted = begin.whiten @ _jacobian(turned, placed[:, :2] / placed[:, 2:], 1 / placed[:, 2])
-    return replace(best, cov=np.linalg.inv(weighted.T @ weighted))
+    return replace(best, cov=np.asarray(np.linalg.inv(weighted.T @ weighted), float))

@@ -7,7 +7,21 @@ import io
 
 from ..document import Document
 
-COLUMNS = ("photo", "label", "what", "value", "unit", "u", "low", "high", "level", "method", "evaluation", "budget", "notes")
+COLUMNS = (
+    "photo",
+    "label",
+    "what",
+    "value",
+    "unit",
+    "u",
+    "low",
+    "high",
+    "level",
+    "method",
+    "evaluation",
+    "budget",
+    "notes",
+)
 
 
 def report(document: Document) -> str:
@@ -19,7 +33,21 @@ def report(document: Document) -> str:
     for m in document.measurements:
         budget = "; ".join(f"{c.name} {c.share:.4f}" for c in m.budget)
         codes = " ".join(dict.fromkeys(n.code for n in m.notes))
-        row = (name, m.label, m.what, m.value, m.unit, m.u, m.low, m.high, m.level, m.method, m.evaluation, budget, codes)
+        row = (
+            name,
+            m.label,
+            m.what,
+            m.value,
+            m.unit,
+            m.u,
+            m.low,
+            m.high,
+            m.level,
+            m.method,
+            m.evaluation,
+            budget,
+            codes,
+        )
         writer.writerow([_safe(cell) for cell in row])
     return out.getvalue().rstrip("\n")
 

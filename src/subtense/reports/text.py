@@ -13,11 +13,19 @@ WIDTH = 100
 _BAR = 20
 
 TITLES = {
-    "range": "distance from the entrance pupil (range)", "depth": "distance along the axis (depth)", "length": "length", "size": "real size",
-    "extent": "extent in the picture", "focal_length": "focal length", "focal_length_px": "focal length in pixels",
-    "sensor_scale": "pixels per mm on the sensor", "object_scale": "mm per pixel at the object",
-    "field_of_view": "field of view across the width", "angle": "angle the object subtends", "tilt": "tilt to the image plane",
-}  # fmt: skip
+    "range": "distance from the entrance pupil (range)",
+    "depth": "distance along the axis (depth)",
+    "length": "length",
+    "size": "real size",
+    "extent": "extent in the picture",
+    "focal_length": "focal length",
+    "focal_length_px": "focal length in pixels",
+    "sensor_scale": "pixels per mm on the sensor",
+    "object_scale": "mm per pixel at the object",
+    "field_of_view": "field of view across the width",
+    "angle": "angle the object subtends",
+    "tilt": "tilt to the line of sight",
+}
 
 
 def report(document: Document) -> str:
@@ -27,7 +35,7 @@ def report(document: Document) -> str:
         p = document.photo
         lines += [f"{p['name']}, {p['width_px']} x {p['height_px']} px"]
     if document.camera:
-        lines += [_camera(document)]
+        lines += _camera(document)
     lines += _notes(document.notes)
     for label in dict.fromkeys(m.label for m in document.measurements):
         group = [m for m in document.measurements if m.label == label]
@@ -35,12 +43,15 @@ def report(document: Document) -> str:
     return "\n".join(line for line in lines if line is not None)
 
 
-def _camera(document: Document) -> str:
-    assert document.camera is not None
-    f, u, source = document.camera.get("f_px"), document.camera.get("u_f_px"), document.camera.get("source", "")
-    if f is None:
-        return f"camera: {source}"
-    return f"camera: f = {number(f, 'px', u)}{f' ± {number(1.96 * u, chr(112) + chr(120), u)}' if u else ''} ({source})"
+def _camera(document: Document) -> Iterator[str]:
+    camera = document.camera or {}
+    f, u = camera["f_px"], camera.get("u_f_px")
+    doubt = f" ± {number(1.96 * u, 'px', u)} (95 %)" if u else ""
+    yield f"camera: f = {number(f, 'px', u)}{doubt}, {camera['source']}"
+    for other in camera.get("hypotheses", ()):
+        if not other["chosen"]:
+            said = f"f = {number(other['f_px'], 'px', other['u_f_px'])}, " if other["f_px"] else "nothing: "
+            yield f"  {other['source']} says {said}{other['text']}"
 
 
 def _group(group: list[Measurement]) -> Iterator[str]:

@@ -11,15 +11,17 @@ from .. import propagate
 from ..document import Document
 from ..errors import InputError
 from ..methods import calculator
-from ..noun import Noun, fields_of
 from ..quantity import Measurement, Quantity
+from .given import given
 from .improve import improved
 
 _FIELD_OF = {"distance": "distance_m", "size": "size_m", "extent": "extent_px", "focal_length": "focal_length_m"}
 _ALWAYS = ("range_m", "sensor_px_per_m", "focal_length_px", "object_m_per_px", "field_of_view_rad", "angle_rad")
 
 
-def calculate(inputs: calculator.Inputs, *, image_height: Quantity | None = None, level: float = 0.95, seed: int = 0) -> Document:
+def calculate(
+    inputs: calculator.Inputs, *, image_height: Quantity | None = None, level: float = 0.95, seed: int = 0
+) -> Document:
     """Solve the classical relation for the value that was left out.
 
     Args:
@@ -46,22 +48,6 @@ def _headed(measurements: list[Measurement]) -> list[Measurement]:
     return [head, *(dataclasses.replace(m, notes=()) for m in rest)]
 
 
-def given(inputs: Any) -> dict[str, Any]:
-    """The inputs of a method in JSON; a noun that stands twice is written once and referred to."""
-    seen: dict[Any, str] = {}
-    data: dict[str, Any] = {}
-    for name, value in fields_of(inputs).items():
-        if isinstance(value, Noun):
-            if value.identity in seen:
-                data[name] = {"$ref": seen[value.identity]}
-                continue
-            data[name] = value.to_json()
-            seen[value.identity] = f"#/given/{name}"
-        else:
-            data[name] = value
-    return data
-
-
 def _camera(found: dict[str, Measurement], inputs: calculator.Inputs) -> dict[str, Any]:
     f = found["focal_length_px"]
     return {"f_px": f.value, "u_f_px": f.u, "width_px": int(inputs.image_width.value), "height_px": None,
@@ -78,9 +64,15 @@ def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
     for name in (*calculator.UNKNOWNS, "sensor_width", "image_width", "aspect"):
         quantity = getattr(inputs, name)
         if quantity is not None and not np.all(np.asarray(quantity.value) > 0):
-            raise InputError(name.replace("_", " "), f"{float(quantity.value):g} {quantity.unit}", "give a number above 0")
+            raise InputError(
+                name.replace("_", " "), f"{float(quantity.value):g} {quantity.unit}", "give a number above 0"
+            )
     limit = inputs.image_width if inputs.along == "width" else image_height
     if inputs.extent is not None and limit is not None and np.any(inputs.extent.value > limit.value):
-        raise InputError("extent", f"{float(inputs.extent.value):g} px", f"the picture has {float(limit.value):g} px along its {inputs.along}")
+        raise InputError(
+            "extent",
+            f"{float(inputs.extent.value):g} px",
+            f"the picture has {float(limit.value):g} px along its {inputs.along}",
+        )
     if abs(float(inputs.tilt.value)) >= np.pi / 2:
         raise InputError("tilt", f"{np.degrees(float(inputs.tilt.value)):g}°", "give an angle between -90° and 90°")

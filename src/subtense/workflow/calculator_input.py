@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from .. import assumptions
 from ..errors import InputError
@@ -39,15 +40,21 @@ def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity |
     preset = find_preset(text["preset"]) if text.get("preset") else None  # type: ignore[arg-type]
     image_width = said["image_width"] or (preset.image_width if preset else None)
     if image_width is None:
-        raise InputError("--image-width", "missing", "give the picture's width in pixels, or a --preset of a camera class")
+        raise InputError(
+            "--image-width", "missing", "give the picture's width in pixels, or a --preset of a camera class"
+        )
     unknowns = {
         "focal_length": said["focal"], "size": said["size"], "extent": said["extent"], "distance": said["distance"],
     }  # fmt: skip
-    if unknowns["focal_length"] is None and preset and None not in [unknowns[n] for n in ("size", "extent", "distance")]:
+    if (
+        unknowns["focal_length"] is None
+        and preset
+        and None not in [unknowns[n] for n in ("size", "extent", "distance")]
+    ):
         pass  # the focal length is what is asked for
     elif unknowns["focal_length"] is None and preset:
         unknowns["focal_length"] = preset.focal_length
-    optional = {name: said[name] for name in ("aspect", "tilt") if said[name] is not None}
+    optional: dict[str, Any] = {name: said[name] for name in ("aspect", "tilt") if said[name] is not None}
     optional |= _offset(text.get("offset"))
     inputs = Inputs(_sensor_width(said, preset, image_width), image_width, **unknowns, along=text.get("along") or "width",
                     **optional)  # type: ignore[arg-type]  # fmt: skip

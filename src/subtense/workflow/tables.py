@@ -1,28 +1,23 @@
-"""The tables of all ways: to add one, write its file and add its line here."""
+"""The tables of all ways: to add one, write its file and add its line here (camera sources stand in
+resolve_camera, reports in report_of)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..document import Document
-from ..errors import InputError
+from ..detectors import markers
 from ..method import Method
-from ..methods import calculator, known_size
-from ..reports import csv, json, text
+from ..methods import calculator, known_size, pose
+from ..observation import Observation
+from ..photo import Photo
+from .report_of import REPORTS
+from .resolve_camera import CAMERA_SOURCES
 
-METHODS: dict[str, Method] = {m.name: m for m in (calculator.METHOD, known_size.METHOD)}
+METHODS: dict[str, Method] = {m.name: m for m in (calculator.METHOD, known_size.METHOD, pose.METHOD)}
 """Ways to measure, by name."""
 
-REPORTS: dict[str, Callable[[Document], str]] = {"text": text.report, "json": json.report, "csv": csv.report}
-"""Ways to show a document as text, by the name `--format` takes."""
+DETECTORS: dict[str, Callable[[Photo], tuple[Observation, ...]]] = {"markers": markers.markers}
+"""Ways to see targets in a photo by themselves, by name."""
 
 
-def report_of(form: str) -> Callable[[Document], str]:
-    """The report of a name.
-
-    Raises:
-        InputError: no such report.
-    """
-    if form not in REPORTS:
-        raise InputError("--format", form, f"give {', '.join(REPORTS)}")
-    return REPORTS[form]
+__all__ = ["CAMERA_SOURCES", "DETECTORS", "METHODS", "REPORTS"]

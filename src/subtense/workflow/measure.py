@@ -1,0 +1,126 @@
+"""Measuring in a photo: what was seen, with the camera that saw it, to a Document."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from .. import propagate
+from ..assumptions import unknown_tilt
+from ..detectors.markers import FAMILIES, markers
+from ..document import Document, Shape
+from ..errors import InputError, NothingFoundError
+from ..method import Method
+from ..methods import known_size, pose
+from ..observation import Observation
+from ..photo import Photo
+from ..quantity import Measurement, Quantity
+from ..target import Target
+from .given import given
+from .improve import improved
+from .resolve_camera import Resolved, resolve_camera
+
+
+def measure_lines(
+    photo: Photo, lines: Sequence[Observation], sizes: Sequence[Quantity], *, camera: str | None = None,
+    tilt: Quantity | None = None, level: float = 0.95, seed: int = 0,
+) -> Document:  # fmt: skip
+    """Distance of objects of known size, each from its two ends.
+
+    Args:
+        photo: the picture.
+        lines: two points each, px of the upright picture.
+        sizes: real size of each, m; one for all is enough.
+        camera: what the user said of it; None to go by the photo.
+        tilt: of the objects to the image plane, rad; None takes them as within 20 degrees of facing the camera.
+        level: coverage of the intervals.
+        seed: of the draws.
+
+    Raises:
+        InputError: an end outside the picture, or sizes that don't match.
+        UnknownCameraError, GeometryError: no camera, no finite answer.
+    """
+    if len(sizes) not in (1, len(lines)):
+        raise InputError("--size", f"{len(sizes)} sizes for {len(lines)} lines", "give one for all, or one for each")
+    for line in lines:
+        _check_inside(photo, line)
+    resolved = resolve_camera(photo, camera)
+    each = list(sizes) * len(lines) if len(sizes) == 1 else list(sizes)
+    tilt = tilt or unknown_tilt()
+    found: list[Measurement] = []
+    for number, (line, size) in enumerate(zip(lines, each, strict=True), 1):
+        inputs = known_size.Inputs(resolved.camera, line, size, tilt)
+        label = line.label or (f"line {number}" if len(lines) > 1 else "")
+        found += _measured(known_size.METHOD, inputs, label, level, seed)
+    shapes = [
+        Shape(_pairs(line), False, line.label or (f"line {i}" if len(lines) > 1 else ""))
+        for i, line in enumerate(lines, 1)
+    ]
+    return _document(photo, resolved, found, shapes)
+
+
+def measure_markers(
+    photo: Photo,
+    size: Quantity,
+    *,
+    family: str | None = None,
+    camera: str | None = None,
+    level: float = 0.95,
+    seed: int = 0,
+) -> Document:
+    """Range, depth and tilt of every marker in a photo.
+
+    Args:
+        photo: the picture.
+        size: side of the markers' black square, m.
+        family: of the markers; None to try all.
+        camera: what the user said of it; None to go by the photo.
+        level: coverage of the intervals.
+        seed: of the draws.
+
+    Raises:
+        NothingFoundError: no marker.
+        UnknownCameraError: no camera.
+    """
+    if family is not None and family not in FAMILIES:
+        raise InputError("--marker-family", family, f"known are {', '.join(FAMILIES)}")
+    resolved = resolve_camera(photo, camera)
+    seen = markers(photo, family)
+    if not seen:
+        raise NothingFoundError(f"{photo.path.name}: no marker found, one is needed; it must be sharp, whole, with a light border, "
+                                "and at least 15 px wide")  # fmt: skip
+    target = Target.square(size, "marker")
+    found: list[Measurement] = []
+    for one in seen:
+        found += _measured(pose.METHOD, pose.Inputs(resolved.camera, one, target), one.label, level, seed)
+    return _document(photo, resolved, found, [Shape(_pairs(one), True, one.label) for one in seen])
+
+
+def camera_document(photo: Photo, given_camera: str | None = None) -> Document:
+    """The camera of a photo alone."""
+    return _document(photo, resolve_camera(photo, given_camera), [], [])
+
+
+def _measured(method: Method, inputs: object, label: str, level: float, seed: int) -> list[Measurement]:
+    """The outputs of one thing; its notes stand with the headline."""
+    found = propagate.measure(method, inputs, level=level, seed=seed, label=label, given=given(inputs))
+    return [found[0], *(dataclasses.replace(m, notes=()) for m in found[1:])]
+
+
+def _document(photo: Photo, resolved: Resolved, found: Sequence[Measurement], shapes: Sequence[Shape]) -> Document:
+    return Document(improved(tuple(found)), resolved.to_json(), photo.to_json(), resolved.notes, tuple(shapes))
+
+
+def _pairs(observation: Observation) -> tuple[tuple[float, float], ...]:
+    return tuple((float(x), float(y)) for x, y in observation.points_px)
+
+
+def _check_inside(photo: Photo, line: Observation) -> None:
+    limit = np.array([photo.width_px, photo.height_px]) - 0.5
+    if np.any(line.points_px < -0.5) or np.any(line.points_px > limit):
+        ends = ";".join(f"{x:g},{y:g}" for x, y in line.points_px)
+        raise InputError(
+            "--line", ends, f"the picture has {photo.width_px} x {photo.height_px} px; both ends must lie in it"
+        )
