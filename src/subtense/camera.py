@@ -14,6 +14,7 @@ from .distribution import Array
 from .errors import InputError
 from .lenses import LENSES
 from .noun import Noun, Part, plain
+from .quantity import Quantity
 
 _INTRINSICS = ("f_px", "aspect", "cx_px", "cy_px")
 _GROUPS = (("focal length", 0, 1), ("pixel aspect", 1, 2), ("principal point", 2, 4), ("lens distortion", 4, None))
@@ -273,6 +274,37 @@ class Camera(Noun):
             columns = [k.get(i, self.coefficients[..., i]) for i in range(self.coefficients.shape[-1])]
             changes["distortion"] = np.stack(np.broadcast_arrays(*columns), -1)
         return self._with(**changes)
+
+    @classmethod
+    def parse(cls, text: str, *, name: str = "camera") -> Self:
+        """Read `1600x1200, f=1500 ± 10 px[, centre=799.5;599.5][, distortion=k1;k2;p1;p2;k3]`."""
+        size, *pairs = (word.strip() for word in text.split(","))
+        said = dict(pair.partition("=")[::2] for pair in pairs)
+        try:
+            width, height = (int(word) for word in size.lower().split("x"))
+            lists = {key: [float(x) for x in said[key].split(";")] for key in ("centre", "distortion") if key in said}
+        except ValueError:
+            lists, said = {}, {}
+        if len(lists.get("centre", (0, 0))) != 2:
+            said = {}
+        if "f" not in said or set(said) - {"f", "centre", "distortion"}:
+            raise InputError(name, text, "write '1600x1200, f=1500 ± 10 px, centre=799.5;599.5', or @file.json")
+        f = Quantity.parse(said["f"], "px", name=name)
+        cx, cy = lists.get("centre", [(width - 1) / 2, (height - 1) / 2])
+        k = lists.get("distortion")
+        camera = cls(
+            width,
+            height,
+            float(f.value),
+            cx,
+            cy,
+            lens="brown_conrady" if k else "pinhole",
+            distortion=np.array(k) if k else None,
+            source=f.source,
+        )
+        cov = np.zeros((4 + camera.coefficients.size,) * 2)
+        cov[0, 0] = float(f.u) ** 2
+        return camera._with(cov=cov)
 
     def to_json(self) -> dict[str, Any]:
         data: dict[str, Any] = {

@@ -14,6 +14,7 @@ from .errors import SubtenseError
 
 if TYPE_CHECKING:
     from .document import Document
+    from .method import Method
 
 
 class _Group(click.Group):
@@ -140,6 +141,61 @@ def measure(photo: Path, lines: tuple[str, ...], sizes: tuple[str, ...], tilt: s
 
         write(document, picture, overlay)
     _show(document, form)
+
+
+class _Methods(click.Group):
+    """One command per row of METHODS, made from its Inputs when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        from .workflow.tables import METHODS
+
+        return list(METHODS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        from .workflow.tables import METHODS
+
+        found = METHODS.get(cmd_name)
+        return None if found is None else _method_command(found)
+
+
+@main.group(cls=_Methods)
+def method() -> None:
+    """Any method by its own inputs: a camera, points, quantities, as text or @file.json."""
+
+
+def _method_command(found: Method) -> click.Command:
+    from .workflow.given import noun_types
+
+    options = [
+        click.Option(
+            ["--" + name.replace("_", "-")], metavar=kind.__name__.upper(), help=_attribute(found.inputs, name)
+        )
+        for name, kind in noun_types(found.inputs).items()
+    ]
+    inputs = click.Option(
+        ["--inputs"], type=click.Path(path_type=Path), help="All of them in a JSON file, as under `given`."
+    )
+
+    @_output_options
+    def run(form: str, level: float, seed: int, inputs: Path | None, **texts: str | None) -> None:
+        from .workflow.measure import measure_inputs
+
+        _show(
+            measure_inputs(found, inputs, {k: v for k, v in texts.items() if v is not None}, level=level, seed=seed),
+            form,
+        )
+
+    params = [*options, inputs, *reversed(run.__click_params__)]  # type: ignore[attr-defined]
+    text = f"{found.title[0].upper()}{found.title[1:]}.\n\n{found.needs}"
+    return click.Command(found.name, params=params, callback=run, help=text)
+
+
+def _attribute(inputs: type, name: str) -> str:
+    """What the Inputs' docstring says of a field."""
+    import re
+
+    match = re.search(rf"^\s*{name}: (.*?)(?=^\s*\w+: |\Z)", inputs.__doc__ or "", re.MULTILINE | re.DOTALL)
+    return " ".join(match.group(1).split()) if match else ""
 
 
 @main.command()

@@ -151,7 +151,7 @@ _LAST_STEP = 3e-7  # a residual below this is below 1e-12 after one more quadrat
 
 def _brown_to_ray(xd: Array, yd: Array, k: Coefficients) -> Triple:
     if len(k) >= 14:
-        xd, yd = _through(np.linalg.inv(_tilt(k)), xd, yd)
+        xd, yd = _through(np.asarray(np.linalg.inv(_tilt(k)), float), xd, yd)
     limit = _turning_radius(k)
     x, y = _start(xd, yd, k, limit)
     residual = np.zeros_like(x)

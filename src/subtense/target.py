@@ -58,6 +58,26 @@ class Target(Noun):
         return cls(name, corners, float(side.u) / float(side.value), scale_distribution=side.distribution,
                    source=side.source)  # fmt: skip
 
+    @classmethod
+    def rectangle(cls, width: Quantity, height: Quantity, name: str) -> Self:
+        """A flat rectangle, corners as in `square`; its size is doubtful as a whole, by the larger relative u."""
+        w, h = float(width.value), float(height.value)
+        if not (w > 0 and h > 0):
+            raise InputError("size", f"{w} x {h}", "give lengths above 0")
+        corners = np.array([[-w, -h, 0], [w, -h, 0], [w, h, 0], [-w, h, 0.0]]) / 2
+        return cls(name, corners, max(float(width.u) / w, float(height.u) / h), source=width.source)
+
+    @classmethod
+    def parse(cls, text: str, *, name: str = "target") -> Self:
+        """Read `square 50 ± 0.2 mm` or `rectangle 297 ± 1 mm x 210 ± 1 mm`."""
+        shape, _, size = text.strip().partition(" ")
+        sides = [Quantity.parse(side, "m", bare="mm", name=name) for side in size.split(" x ")] if size else []
+        if shape == "square" and len(sides) == 1:
+            return cls.square(sides[0], "square")
+        if shape == "rectangle" and len(sides) == 2:
+            return cls.rectangle(sides[0], sides[1], "rectangle")
+        raise InputError(name, text, "write 'square 50 ± 0.2 mm' or 'rectangle 297 ± 1 mm x 210 ± 1 mm', or @file.json")
+
     def parts(self) -> tuple[Part, ...]:
         parts = []
         if self.u_scale:

@@ -53,18 +53,18 @@ class Inputs:
         focus: share of the thin-lens extension that is added.
     """
 
-    sensor_width: Quantity
-    image_width: Quantity
-    focal_length: Quantity | None = None
-    size: Quantity | None = None
-    extent: Quantity | None = None
-    distance: Quantity | None = None
+    sensor_width: Quantity = field(metadata={"unit": "m"})
+    image_width: Quantity = field(metadata={"unit": "px"})
+    focal_length: Quantity | None = field(default=None, metadata={"unit": "m"})
+    size: Quantity | None = field(default=None, metadata={"unit": "m"})
+    extent: Quantity | None = field(default=None, metadata={"unit": "px"})
+    distance: Quantity | None = field(default=None, metadata={"unit": "m"})
     along: str = "width"
-    aspect: Quantity = field(default_factory=square_pixels)
-    tilt: Quantity = field(default_factory=frontal)
-    offset_x: Quantity = field(default_factory=centred)
-    offset_y: Quantity = field(default_factory=centred)
-    focus: Quantity = field(default_factory=classical)
+    aspect: Quantity = field(default_factory=square_pixels, metadata={"unit": "1"})
+    tilt: Quantity = field(default_factory=frontal, metadata={"unit": "rad"})
+    offset_x: Quantity = field(default_factory=centred, metadata={"unit": "px"})
+    offset_y: Quantity = field(default_factory=centred, metadata={"unit": "px"})
+    focus: Quantity = field(default_factory=classical, metadata={"unit": "1"})
 
     @property
     def unknown(self) -> str:

@@ -38,9 +38,9 @@ class Inputs:
 
     camera: Camera
     ends: Observation
-    size: Quantity
-    tilt: Quantity = field(default_factory=frontal)
-    focus: Quantity = field(default_factory=thin_lens)
+    size: Quantity = field(metadata={"unit": "m"})
+    tilt: Quantity = field(default_factory=frontal, metadata={"unit": "rad"})
+    focus: Quantity = field(default_factory=thin_lens, metadata={"unit": "1"})
 
 
 @dataclass(frozen=True)

@@ -54,8 +54,8 @@ class Inputs:
     camera: Camera
     points: Observation
     target: Target
-    focus: Quantity = field(default_factory=thin_lens)
-    ambiguity: Quantity = field(default_factory=unambiguous)
+    focus: Quantity = field(default_factory=thin_lens, metadata={"unit": "1"})
+    ambiguity: Quantity = field(default_factory=unambiguous, metadata={"unit": "1"})
 
     def __post_init__(self) -> None:
         seen, known = self.points.points_px.shape[-2], self.target.points_m.shape[-2]

@@ -43,7 +43,7 @@ def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity |
         raise InputError(
             "--image-width", "missing", "give the picture's width in pixels, or a --preset of a camera class"
         )
-    unknowns = {
+    unknowns: dict[str, Any] = {
         "focal_length": said["focal"], "size": said["size"], "extent": said["extent"], "distance": said["distance"],
     }  # fmt: skip
     if (
@@ -57,7 +57,7 @@ def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity |
     optional: dict[str, Any] = {name: said[name] for name in ("aspect", "tilt") if said[name] is not None}
     optional |= _offset(text.get("offset"))
     inputs = Inputs(_sensor_width(said, preset, image_width), image_width, **unknowns, along=text.get("along") or "width",
-                    **optional)  # type: ignore[arg-type]  # fmt: skip
+                    **optional)  # fmt: skip
     return inputs, said["image_height"]
 
 

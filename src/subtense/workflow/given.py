@@ -1,10 +1,22 @@
-"""The inputs of a method as JSON: enough to measure again."""
+"""The inputs of a method as JSON, enough to measure again, and back from JSON or from texts."""
 
 from __future__ import annotations
 
+import dataclasses
+import json
+import types
+import typing
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+from ..errors import FileFormatError, InputError
+from ..method import Method
 from ..noun import Noun, fields_of
+from ..quantity import Quantity
+
+BARE = {"m": "mm", "rad": "deg"}
+"""The unit a bare number is read in, where it is not the one it is kept in."""
 
 
 def given(inputs: Any) -> dict[str, Any]:
@@ -21,3 +33,93 @@ def given(inputs: Any) -> dict[str, Any]:
         else:
             data[name] = value
     return data
+
+
+def noun_types(inputs: type) -> dict[str, type]:
+    """The noun (or plain type) of each field of an Inputs class; `None` beside it is left out."""
+    hints = typing.get_type_hints(inputs)
+    found = {}
+    for field in dataclasses.fields(inputs):
+        hint = hints[field.name]
+        if isinstance(hint, types.UnionType):
+            hint = next(arm for arm in typing.get_args(hint) if arm is not type(None))
+        found[field.name] = hint
+    return found
+
+
+def inputs_from_json(method: Method, data: Mapping[str, Any]) -> Any:
+    """The Inputs of a method from what `given` wrote.
+
+    Raises:
+        InputError: a field that the method does not have, or one that can't be read.
+    """
+    kinds = noun_types(method.inputs)
+    values: dict[str, Any] = {}
+    for name, value in data.items():
+        if name not in kinds:
+            raise InputError("given", name, f"{method.name} takes {', '.join(kinds)}")
+        if isinstance(value, Mapping) and "$ref" in value:
+            values[name] = values.get(str(value["$ref"]).rpartition("/")[2])
+        elif isinstance(value, Mapping):
+            values[name] = _noun_from_json(kinds[name], name, value)
+        else:
+            values[name] = value
+    return _made(method, values)
+
+
+def inputs_from_text(method: Method, texts: Mapping[str, str]) -> Any:
+    """The Inputs of a method from what a person typed, field by field; `@file.json` reads a noun from a file.
+
+    Raises:
+        InputError: a text that can't be read, or something missing.
+    """
+    kinds = noun_types(method.inputs)
+    units = {field.name: field.metadata.get("unit", "") for field in dataclasses.fields(method.inputs)}
+    values: dict[str, Any] = {}
+    for name, text in texts.items():
+        option = "--" + name.replace("_", "-")
+        kind: Any = kinds[name]
+        if text.startswith("@"):
+            values[name] = _noun_from_json(kind, option, read_json(Path(text[1:])))
+        elif kind is Quantity:
+            values[name] = Quantity.parse(text, units[name], bare=BARE.get(units[name]), name=option)
+        elif issubclass(kind, Noun):
+            values[name] = kind.parse(text, name=option)  # type: ignore[attr-defined]
+        else:
+            values[name] = kind(text)
+    return _made(method, values)
+
+
+def read_json(path: Path) -> Any:
+    """A small JSON file.
+
+    Raises:
+        FileFormatError: no such file, too large, or not JSON.
+    """
+    if not path.is_file():
+        raise FileFormatError(path, "no such file")
+    if path.stat().st_size > 2**20:
+        raise FileFormatError(path, "is larger than 1 MiB")
+    try:
+        return json.loads(path.read_text("utf-8"))
+    except (ValueError, RecursionError):
+        raise FileFormatError(path, "is not JSON") from None
+
+
+def _noun_from_json(kind: Any, name: str, data: Any) -> Any:
+    try:
+        return kind.from_json(data)
+    except InputError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(name, type(error).__name__, f"give a {kind.__name__} as JSON") from None
+
+
+def _made(method: Method, values: Mapping[str, Any]) -> Any:
+    try:
+        return method.inputs(**values)
+    except TypeError:
+        needed = [f.name for f in dataclasses.fields(method.inputs)
+                  if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING]  # fmt: skip
+        missing = [name for name in needed if name not in values]
+        raise InputError("inputs", "incomplete", f"{method.name} also needs {', '.join(missing)}") from None

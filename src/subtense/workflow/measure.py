@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -11,14 +12,14 @@ from .. import propagate
 from ..assumptions import unknown_tilt
 from ..detectors.markers import FAMILIES, markers
 from ..document import Document, Shape
-from ..errors import InputError, NothingFoundError
+from ..errors import FileFormatError, InputError, NothingFoundError
 from ..method import Method
 from ..methods import known_size, pose
 from ..observation import Observation
 from ..photo import Photo
 from ..quantity import Measurement, Quantity
 from ..target import Target
-from .given import given
+from .given import given, inputs_from_json, inputs_from_text, read_json
 from .improve import improved
 from .resolve_camera import Resolved, resolve_camera
 
@@ -96,6 +97,31 @@ def measure_markers(
     for one in seen:
         found += _measured(pose.METHOD, pose.Inputs(resolved.camera, one, target), one.label, level, seed)
     return _document(photo, resolved, found, [Shape(_pairs(one), True, one.label) for one in seen])
+
+
+def measure_inputs(
+    method: Method, file: Path | None, texts: Mapping[str, str], *, level: float = 0.95, seed: int = 0
+) -> Document:
+    """Any method, by a JSON file of its inputs or by texts for its fields.
+
+    Raises:
+        InputError, FileFormatError: inputs that can't be read, or both or neither given.
+        GeometryError: no finite answer.
+    """
+    if (file is None) == (not texts):
+        raise InputError(
+            "inputs", "neither" if file is None else "both", "give either --inputs FILE or the single inputs"
+        )
+    if file is None:
+        inputs = inputs_from_text(method, texts)
+    else:
+        data = read_json(file)
+        if not isinstance(data, dict):
+            raise FileFormatError(file, "holds no object of inputs")
+        inputs = inputs_from_json(method, data.get("given", data))
+    camera = getattr(inputs, "camera", None)
+    found = _measured(method, inputs, "", level, seed)
+    return Document(improved(tuple(found)), {**camera.to_json(), "u_f_px": camera.u_f_px} if camera else None)
 
 
 def camera_document(photo: Photo, given_camera: str | None = None) -> Document:
