@@ -55,7 +55,9 @@ class Distribution:
     @property
     def mean(self) -> float:
         """Mean of z: 0 for all laws that are symmetric about the stated value."""
-        return {"one_sided": self.shape * _ROOT3 / 2.0, "either": math.sqrt(self.shape)}.get(self.name, 0.0)
+        if self.name == "one_sided":
+            return self.shape * _ROOT3 / 2.0
+        return math.sqrt(self.shape) if self.name == "either" else 0.0
 
     @property
     def excess_kurtosis(self) -> float:

@@ -84,7 +84,7 @@ def inputs_from_text(method: Method, texts: Mapping[str, str]) -> Any:
         elif kind is Quantity:
             values[name] = Quantity.parse(text, units[name], bare=BARE.get(units[name]), name=option)
         elif issubclass(kind, Noun):
-            values[name] = kind.parse(text, name=option)  # type: ignore[attr-defined]
+            values[name] = kind.parse(text, name=option)
         else:
             values[name] = kind(text)
     return _made(method, values)
