@@ -188,7 +188,7 @@ def calculator(inputs: Inputs) -> Result:
         assert focal is not None and size is not None and extent is not None and distance is not None
         f = focal / s.pitch
         bx, by, ax, ay = s.ox / f, s.oy / f, s.ex * extent / f, s.ey * extent / f
-        step = size * s.sine / 2 / distance
+        step = size * s.sine / 4 / distance  # the middle of the 3-D segment: Z b + (half step) a / 2
         range_m = distance * np.sqrt(1 + (bx + step * ax) ** 2 + (by + step * ay) ** 2)
         view = 2 * np.arctan2(np.asarray(inputs.sensor_width.value), 2 * focal)
         angle = _angle(bx - ax / 2, by - ay / 2, bx + ax / 2, by + ay / 2)

@@ -64,8 +64,8 @@ def known_size(inputs: Inputs) -> Result:
     depth, half_step = segment_depth(ax, ay, bx, by, size, np.asarray(inputs.tilt.value))
     extension = np.asarray(inputs.focus.value) * (inputs.camera.nominal_focal_m or 0.0)
     depth_m = depth + extension if inputs.camera.nominal_focal_m else depth
-    # the middle of the 3-D segment: Z b + (half step) a, at depth Z
-    shift = half_step / depth if np.any(half_step) else 0.0
+    # the middle of the 3-D segment: Z b + (half step) a / 2, at depth Z
+    shift = half_step / (2 * depth) if np.any(half_step) else 0.0
     range_m = depth_m * np.sqrt(1 + (bx + shift * ax) ** 2 + (by + shift * ay) ** 2)
     if np.all(depth_m > 0) and np.all(np.isfinite(range_m)) and LENSES[inputs.camera.lens].perspective:
         return Result(range_m, depth_m, np.zeros(range_m.shape, np.int8))  # nothing went wrong: the usual case
@@ -92,14 +92,15 @@ def derivative(inputs: Inputs, result: Result) -> dict[str, dict[tuple[str, str]
     dx, dy = x[..., 1] - x[..., 0], (y[..., 1] - y[..., 0]) / aspect
     bx = ((x[..., 0] + x[..., 1]) / 2 - camera.cx_px) / f
     by = ((y[..., 0] + y[..., 1]) / 2 - camera.cy_px) / (f * aspect)
-    depth, slant = result.depth_m, result.range_m / result.depth_m
+    depth, slant = np.where(result.reason == 0, result.depth_m, np.nan), np.hypot(1, np.hypot(bx, by))
     classical = depth - np.asarray(inputs.focus.value) * (camera.nominal_focal_m or 0.0)
-    per_e2 = -classical / (dx * dx + dy * dy)
+    length2 = np.where(result.reason == 0, dx * dx + dy * dy, np.nan)
+    per_e2 = -classical / length2
     ends = np.stack([-per_e2 * dx, -per_e2 * dy / aspect, per_e2 * dx, per_e2 * dy / aspect])
     turn_x, turn_y = depth * bx / (slant * f), depth * by / (slant * f * aspect)
     half = np.stack([turn_x, turn_y, turn_x, turn_y]) / 2
     along = {
-        "f": classical / f, "aspect": classical * dy * dy / (dx * dx + dy * dy) / aspect,
+        "f": classical / f, "aspect": classical * dy * dy / length2 / aspect,
         "size": classical / np.asarray(inputs.size.value), "focus": np.full_like(depth, camera.nominal_focal_m or 0.0),
     }  # fmt: skip
     b2 = bx * bx + by * by

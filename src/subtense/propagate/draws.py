@@ -16,7 +16,7 @@ import numpy.typing as npt
 from ..distribution import Array
 from ..method import Method, Reason
 from ..space import Correlations, Moved, Space
-from .model import Function, Model, model_of
+from .model import Function, Model, evaluate, model_of
 
 CHUNK = 8192
 """Draws evaluated at once: small enough for the caches of one core."""
@@ -107,7 +107,7 @@ def sample_space(model: Model, space: Space, draws: int, rng: np.random.Generato
         moved: Moved = {}
         for line in space.lines:
             line.put(line.draw(rng, cut.stop - first), moved)
-        values[:, cut], reason[cut] = model.call(space.rebuilt(moved))
+        values[:, cut], reason[cut] = evaluate(model, space, moved, cut.stop - first)
     return Draws(model.names, values, reason)
 
 

@@ -99,8 +99,14 @@ def _mapped(model: Model, space: Space, output: int, variable: int, level: float
     if not np.all(np.isfinite(values)) or not (np.all(step > 0) or np.all(step < 0)):
         return None
     spread = through(np.linspace(0.0005, 0.9995, 1000))
-    u = float(np.std(spread)) if np.all(np.isfinite(spread)) else None
-    return _Answer(u, float(values.min()), float(values.max()), "mapped through the one uncertain input")
+    how = "mapped through the one uncertain input"
+    if np.all(np.isfinite(spread)):
+        return _Answer(float(np.std(spread)), float(values.min()), float(values.max()), how)
+    return _Answer(None, float(values.min()), float(values.max()), how, (_HEAVY_TAIL,))
+
+
+CURE = "make the pixel extent larger or better known: come closer, use a longer lens or a larger object"
+_HEAVY_TAIL = Note("heavy_tail", "the far tail is so long that a standard deviation has no meaning; use the interval", CURE)
 
 
 def _drawn(draws: Draws, o: int, level: float, output: Output) -> _Answer:
@@ -109,27 +115,25 @@ def _drawn(draws: Draws, o: int, level: float, output: Output) -> _Answer:
     evaluation = f"Monte Carlo, {draws.values.shape[1]} draws"
     notes: list[Note] = []
     u: float | None = float(draws.u[o])
-    cure = "make the pixel extent larger or better known: come closer, use a longer lens or a larger object"
     if math.isinf(low) or math.isinf(high):
-        notes.append(_open_note(low, high, lost, output.unit, cure))
+        notes.append(_open_note(low, high, lost, output.unit))
         u = None
     elif lost:
         text = f"{lost:.1%} of the draws have no answer; they count as beyond the interval".replace("%", " %")
-        notes.append(Note("draws_without_answer", text, cure))
+        notes.append(Note("draws_without_answer", text, CURE))
     if u is not None and not draws.stable and _heavy(draws.values[o]):
-        notes.append(Note("heavy_tail", "the far tail is so long that a standard deviation has no meaning; "
-                          "use the interval", cure))  # fmt: skip
+        notes.append(_HEAVY_TAIL)
         u = None
     return _Answer(u, low, high, evaluation, tuple(notes))
 
 
-def _open_note(low: float, high: float, lost: float, unit: str, cure: str) -> Note:
+def _open_note(low: float, high: float, lost: float, unit: str) -> Note:
     share = f"{lost:.0%} of the draws have no answer".replace("%", " %")
     if math.isinf(low) and math.isinf(high):
-        return Note("open_interval", f"both limits are open, {share}", cure)
+        return Note("open_interval", f"both limits are open, {share}", CURE)
     if math.isinf(high):
-        return Note("open_interval", f"from {low:.3g} {unit}, far limit open, {share}", cure)
-    return Note("open_interval", f"up to {high:.3g} {unit}, near limit open, {share}", cure)
+        return Note("open_interval", f"from {low:.3g} {unit}, far limit open, {share}", CURE)
+    return Note("open_interval", f"up to {high:.3g} {unit}, near limit open, {share}", CURE)
 
 
 def _heavy(values: Array) -> bool:

@@ -57,13 +57,18 @@ def method_model(method: Method, inputs: Any) -> Model:
 
 
 def evaluate_at(model: Model, space: Space, z: Array) -> tuple[Array, npt.NDArray[np.int8]]:
-    """Outputs (o, n) at standardised deviations z (m, n)."""
-    if not space.lines:
-        values, reason = model.call(space.inputs)
-        return np.repeat(values[:, None], z.shape[1], axis=1), np.repeat(np.asarray(reason)[None], z.shape[1])
+    """Outputs (o, n) of one scene at standardised deviations z (m, n)."""
     moved: Moved = {}
     first = 0
     for line in space.lines:
         line.put(line.at(z[first : first + line.count]), moved)
         first += line.count
-    return model.call(space.rebuilt(moved))
+    return evaluate(model, space, moved, z.shape[1])
+
+
+def evaluate(model: Model, space: Space, moved: Moved, n: int) -> tuple[Array, npt.NDArray[np.int8]]:
+    """Outputs (o, n) of one scene with moved numbers; what no moved number enters is the same n times."""
+    values, reason = model.call(space.rebuilt(moved))
+    if values.ndim == 1:
+        values, reason = values[:, None], np.asarray(reason)[None]
+    return np.broadcast_to(values, (len(values), n)), np.broadcast_to(reason, (n,))

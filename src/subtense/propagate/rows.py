@@ -65,7 +65,7 @@ def _rows_by_derivative(
     """Rows whose method told its own partial derivatives."""
     reason = np.asarray(result.reason)
     names = tuple(output.name for output in method.outputs)
-    value = np.stack([np.broadcast_to(getattr(result, n), reason.shape) for n in names])
+    value = np.stack([np.where(reason == 0, getattr(result, n), np.nan) for n in names])
     fields = {noun.identity: name for name, noun in _fields(space.inputs[0])}
     contributions = np.empty((len(space.lines), *value.shape))
     for row, line in enumerate(space.lines):

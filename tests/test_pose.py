@@ -1,0 +1,114 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from subtense import propagate
+from subtense.camera import Camera
+from subtense.errors import GeometryError, InputError
+from subtense.geometry import Pose, rotation_from_vector
+from subtense.methods import pose
+from subtense.observation import Observation
+from subtense.quantity import Quantity
+from subtense.target import Target
+
+CAMERA = Camera(1600, 1200, 1300.0, 805.0, 590.0, 1.0, "brown_conrady", np.array([-0.1, 0.02, 1e-3, -5e-4, 0.0]))
+MARKER = Target.square(Quantity.exact(0.05, "m"), "marker")
+SOLID = Target("box", np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1], [0.1, 0.1, 0.1]]))
+
+
+def seen(vector, place, target=MARKER, camera=CAMERA, sigma=0.1, noise=None):
+    there = Pose(rotation_from_vector(np.asarray(vector, float)), np.asarray(place, float))
+    points = camera.project(there.apply(target.points_m))
+    return pose.Inputs(camera, Observation(points if noise is None else points + noise, sigma), target)
+
+
+@pytest.mark.opencv
+@given(st.floats(-0.9, 0.9), st.floats(-0.9, 0.9), st.floats(-3, 3), st.floats(-0.15, 0.15), st.floats(-0.1, 0.1), st.floats(0.3, 2.5))
+def test_finds_a_marker_that_was_put_there(a, b, c, x, y, z):
+    spin = rotation_from_vector(np.array([0, 0, c]))
+    there = Pose(rotation_from_vector(np.array([a, b, 0.0])) @ spin, np.array([x * z, y * z, z]))
+    inputs = pose.Inputs(CAMERA, Observation(CAMERA.project(there.apply(MARKER.points_m)), 0.1), MARKER)
+    found = pose.pose(inputs, pose.start(inputs))
+    assert float(found.range_m) == pytest.approx(np.linalg.norm(there.translation_m), rel=1e-6)
+    assert float(found.depth_m) == pytest.approx(z, rel=1e-6)
+
+
+@pytest.mark.opencv
+@pytest.mark.parametrize("vector", [(0, 0, 0), (0, 0, math.pi / 2), (0, 0, math.pi), (0, 0, 0.7)])
+@pytest.mark.parametrize("place", [(0, 0, 1.0), (0.25, 0.25, 2.0), (-0.25, 0.25, 2.0)])
+def test_a_marker_that_exactly_faces_the_camera(vector, place):
+    inputs = seen(vector, place)
+    found = propagate.measure(pose.METHOD, inputs)
+    assert found[0].value == pytest.approx(np.linalg.norm(place), rel=1e-5)
+
+
+@pytest.mark.opencv
+def test_a_solid_target():
+    inputs = seen((0.3, -0.4, 0.2), (0.1, -0.05, 0.8), SOLID)
+    middle = rotation_from_vector(np.array([0.3, -0.4, 0.2])) @ SOLID.points_m.mean(axis=0) + [0.1, -0.05, 0.8]
+    assert propagate.measure(pose.METHOD, inputs)[0].value == pytest.approx(np.linalg.norm(middle), rel=1e-6)
+
+
+@pytest.mark.opencv
+def test_tilt_is_the_angle_to_the_line_of_sight():
+    inputs = seen((0, math.radians(40), 0), (0, 0, 0.6))
+    assert math.degrees(propagate.measure(pose.METHOD, inputs)[2].value) == pytest.approx(40, abs=1e-4)
+
+
+@pytest.mark.opencv
+def test_covariance_is_the_spread_of_repeated_solutions():
+    rng = np.random.default_rng(5)
+    truth = seen((0.1, 0.7, 0.3), (0.05, -0.03, 0.6), sigma=0.2)
+    m = propagate.measure(pose.METHOD, truth)[0]
+    repeats = []
+    for _ in range(400):
+        inputs = seen((0.1, 0.7, 0.3), (0.05, -0.03, 0.6), sigma=0.2, noise=rng.normal(0, 0.2, (4, 2)))
+        repeats.append(float(pose.pose(inputs, pose.start(inputs)).range_m))
+    assert np.std(repeats) == pytest.approx(m.u, rel=0.12)
+    solved = pose.solution(truth)
+    along = np.concatenate([np.zeros(3), solved.translation_m / np.linalg.norm(solved.translation_m)])
+    assert math.sqrt(along @ solved.cov @ along) == pytest.approx(m.u, rel=0.05)
+
+
+@pytest.mark.opencv
+def test_two_poses_that_the_pixels_cant_tell_apart_are_noted():
+    far = seen((0, math.radians(20), 0), (0, 0, 3.0), sigma=0.5)
+    near = seen((0, math.radians(45), 0), (0, 0, 0.4), sigma=0.1)
+    assert "pose_ambiguous" in {n.code for n in propagate.measure(pose.METHOD, far)[0].notes}
+    assert "pose_ambiguous" not in {n.code for n in propagate.measure(pose.METHOD, near)[0].notes}
+
+
+@pytest.mark.opencv
+def test_target_size_is_one_error_for_all_corners():
+    target = Target.square(Quantity.normal(0.05, 0.0005, "m"), "marker")
+    m = propagate.measure(pose.METHOD, seen((0, 0.5, 0), (0, 0, 0.6), target, sigma=0.001))[0]
+    assert m.u / m.value == pytest.approx(0.01, rel=0.02)
+    assert m.budget[0].name == "size of the marker"
+
+
+@pytest.mark.opencv
+def test_a_nominal_focal_length_gets_its_extension():
+    camera = Camera(1600, 1200, 1300.0, 799.5, 599.5, nominal_focal_m=0.02)
+    m = propagate.measure(pose.METHOD, seen((0, 0.5, 0), (0, 0, 0.6), camera=camera))
+    assert m[1].value == pytest.approx(0.62, rel=1e-6)
+    assert "close_focus" in {n.code for n in m[0].notes}
+
+
+@pytest.mark.opencv
+def test_points_on_one_line_and_wrong_counts_are_refused():
+    line = Target("rod", np.column_stack([np.arange(4.0), np.zeros(4), np.zeros(4)]))
+    with pytest.raises(InputError, match="one line"):
+        pose.start(pose.Inputs(CAMERA, Observation(np.array([[0, 0], [1, 0], [2, 0], [3, 0.0]])), line))
+    with pytest.raises(InputError, match="3 for a target of 4"):
+        pose.Inputs(CAMERA, Observation(np.zeros((3, 2))), MARKER)
+
+
+@pytest.mark.opencv
+def test_a_panorama_is_refused():
+    camera = Camera(3000, 1500, 477.0, 1499.5, 749.5, lens="equirectangular")
+    inputs = pose.Inputs(camera, Observation(np.array([[1400, 700], [1500, 700], [1500, 800], [1400, 800.0]])), MARKER)
+    with pytest.raises(GeometryError, match="panorama"):
+        propagate.measure(pose.METHOD, inputs)
