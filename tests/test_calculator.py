@@ -67,7 +67,9 @@ def test_solving_for_each_value_gives_back_the_others(unknown, tilt, x, y, along
     wanted = {"focal_length": 0.035, "size": 0.2, "extent": 150, "distance": float(first.distance_m)}[unknown]
     del known[unknown]
     again = calculator(Inputs(q(0.0141, "m"), q(4096, "px"), **known, **more))
-    field = {"focal_length": "focal_length_m", "size": "size_m", "extent": "extent_px", "distance": "distance_m"}[unknown]
+    field = {"focal_length": "focal_length_m", "size": "size_m", "extent": "extent_px", "distance": "distance_m"}[
+        unknown
+    ]
     assert float(getattr(again, field)) == pytest.approx(wanted, rel=1e-9)
     assert float(again.range_m) == pytest.approx(float(first.range_m), rel=1e-9)
 
@@ -75,7 +77,7 @@ def test_solving_for_each_value_gives_back_the_others(unknown, tilt, x, y, along
 def test_tilt_and_place_agree_with_a_drawn_triangle():
     """A 2 m pole, middle at (1, 0, 10) m, far end turned away by 30 degrees: seen by f = 1000 px.
 
-        0.134 -------- 1.866 across, 9.5 to 10.5 deep
+    0.134 -------- 1.866 across, 9.5 to 10.5 deep
     """
     z = np.array([9.5, 10.5])
     x = 1 + math.cos(math.radians(30)) * np.array([-1.0, 1.0])

@@ -18,7 +18,9 @@ FISHEYE = [0.05, -0.02, 0.003, -0.001]
 
 
 def camera(lens="brown_conrady", k=None, **more):
-    return Camera(1600, 1200, more.pop("f_px", 1300.0), 805.0, 610.0, 1.01, lens, None if k is None else np.array(k), **more)
+    return Camera(
+        1600, 1200, more.pop("f_px", 1300.0), 805.0, 610.0, 1.01, lens, None if k is None else np.array(k), **more
+    )
 
 
 def scene(n=400, seed=0, wide=0.6):
@@ -52,7 +54,12 @@ def test_fisheye_projects_as_opencv():
 
 @pytest.mark.parametrize(
     "mine",
-    [camera("pinhole"), *(camera(k=k) for k in BROWN.values()), camera("fisheye", FISHEYE, f_px=400.0), camera("equirectangular")],
+    [
+        camera("pinhole"),
+        *(camera(k=k) for k in BROWN.values()),
+        camera("fisheye", FISHEYE, f_px=400.0),
+        camera("equirectangular"),
+    ],
     ids=lambda c: f"{c.lens}-{c.coefficients.size}",
 )
 def test_rays_invert_the_projection_to_1e_10(mine):
@@ -143,7 +150,9 @@ def test_covariance_goes_along(kind):
             for sign in (1, -1):
                 vector = np.array([c.f_px, c.aspect, c.cx_px, c.cy_px, *c.coefficients])
                 vector[j] += sign * step[j]
-                moved.append(Camera(c.width_px, c.height_px, *vector[[0, 2, 3, 1]], c.lens, vector[4:]).project(at).ravel())
+                moved.append(
+                    Camera(c.width_px, c.height_px, *vector[[0, 2, 3, 1]], c.lens, vector[4:]).project(at).ravel()
+                )
             columns.append((moved[0] - moved[1]) / (2 * step[j]))
         return np.array(columns).T
 
@@ -162,7 +171,9 @@ def test_a_tilted_sensor_is_not_turned():
 
 
 def test_json_round_trip_keeps_every_digit():
-    mine = camera(k=BROWN[8], cov=full_covariance(12), nominal_focal_m=0.035, part_sources={"principal point": "assumed"})
+    mine = camera(
+        k=BROWN[8], cov=full_covariance(12), nominal_focal_m=0.035, part_sources={"principal point": "assumed"}
+    )
     back = Camera.from_json(json.loads(json.dumps(mine.to_json())))
     assert back.to_json() == mine.to_json()
     assert back.digest == mine.digest
@@ -185,9 +196,16 @@ def test_refuses_what_no_camera_has(change, name):
 
 def test_independent_numbers_are_separate_lines_and_tied_ones_one():
     cov = np.diag([4.0, 0, 1, 1, 1e-4, 0, 0, 0, 0])
-    assert [p.label for p in camera(k=BROWN[5], cov=cov).parts()] == ["focal length", "principal point", "lens distortion"]
+    assert [p.label for p in camera(k=BROWN[5], cov=cov).parts()] == [
+        "focal length",
+        "principal point",
+        "lens distortion",
+    ]
     cov[0, 2] = cov[2, 0] = 0.5
-    assert [p.label for p in camera(k=BROWN[5], cov=cov).parts()] == ["focal length, principal point", "lens distortion"]
+    assert [p.label for p in camera(k=BROWN[5], cov=cov).parts()] == [
+        "focal length, principal point",
+        "lens distortion",
+    ]
 
 
 def test_parse_reads_a_camera_or_says_how_to_write_one():

@@ -20,7 +20,9 @@ angle = st.floats(-0.5, 0.5)
 
 
 def scene(points, camera=CAMERA, size=0.3, tilt=0.0, sigma=0.5):
-    return Inputs(camera, Observation(points, sigma), Quantity.normal(size, 0.002 * size, "m"), Quantity.normal(tilt, 0.02, "rad"))
+    return Inputs(
+        camera, Observation(points, sigma), Quantity.normal(size, 0.002 * size, "m"), Quantity.normal(tilt, 0.02, "rad")
+    )
 
 
 def numbers(inputs):
@@ -30,7 +32,9 @@ def numbers(inputs):
 
 @given(ends, angle, st.floats(0.01, 100))
 def test_scaling_the_world_scales_the_answer(points, tilt, s):
-    assert numbers(scene(points, size=0.3 * s, tilt=tilt)) == pytest.approx(s * numbers(scene(points, tilt=tilt)), rel=1e-8)
+    assert numbers(scene(points, size=0.3 * s, tilt=tilt)) == pytest.approx(
+        s * numbers(scene(points, tilt=tilt)), rel=1e-8
+    )
 
 
 @given(ends, angle)
@@ -112,8 +116,15 @@ def test_a_nominal_focal_length_gets_its_extension_continuously():
 
 
 def test_unknown_tilt_reaches_to_the_near_side_and_is_noted():
-    inputs = Inputs(CAMERA, Observation(np.array([[700.0, 600], [900, 600]]), 0.1), Quantity.exact(0.3, "m"), assumptions.unknown_tilt())
+    inputs = Inputs(
+        CAMERA,
+        Observation(np.array([[700.0, 600], [900, 600]]), 0.1),
+        Quantity.exact(0.3, "m"),
+        assumptions.unknown_tilt(),
+    )
     m = propagate.measure(METHOD, inputs)[1]
     assert m.value - m.low > 2 * (m.high - m.value)
     assert "unknown_tilt" in {n.code for n in m.notes}
-    assert "frontal_assumption" in {n.code for n in propagate.measure(METHOD, Inputs(CAMERA, inputs.ends, inputs.size))[1].notes}
+    assert "frontal_assumption" in {
+        n.code for n in propagate.measure(METHOD, Inputs(CAMERA, inputs.ends, inputs.size))[1].notes
+    }

@@ -87,7 +87,8 @@ def broken(tmp_path):
     data = whole.read_bytes()
     files = {
         "empty.jpg": b"", "cut.jpg": data[: len(data) // 2], "head.jpg": data[:30], "page.pdf": b"%PDF-1.7\n...",
-        "text.jpg": b"hello", "a.gif": b"GIF89a....", "a.heic": b"\0\0\0\x18ftypheic" + b"\0" * 40, "a.png": b"\x89PNG\r\n\x1a\n" + b"x" * 50,
+        "text.jpg": b"hello", "a.gif": b"GIF89a....",
+        "a.heic": b"\0\0\0\x18ftypheic" + b"\0" * 40, "a.png": b"\x89PNG\r\n\x1a\n" + b"x" * 50,
     }  # fmt: skip
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)

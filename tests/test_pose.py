@@ -26,7 +26,14 @@ def seen(vector, place, target=MARKER, camera=CAMERA, sigma=0.1, noise=None):
 
 
 @pytest.mark.opencv
-@given(st.floats(-0.9, 0.9), st.floats(-0.9, 0.9), st.floats(-3, 3), st.floats(-0.15, 0.15), st.floats(-0.1, 0.1), st.floats(0.3, 2.5))
+@given(
+    st.floats(-0.9, 0.9),
+    st.floats(-0.9, 0.9),
+    st.floats(-3, 3),
+    st.floats(-0.15, 0.15),
+    st.floats(-0.1, 0.1),
+    st.floats(0.3, 2.5),
+)
 def test_finds_a_marker_that_was_put_there(a, b, c, x, y, z):
     spin = rotation_from_vector(np.array([0, 0, c]))
     there = Pose(rotation_from_vector(np.array([a, b, 0.0])) @ spin, np.array([x * z, y * z, z]))

@@ -36,7 +36,21 @@ def test_says_how_plus_minus_was_read():
 
 
 @pytest.mark.parametrize(
-    "text", ["", "abc", "1,5 mm", "200 ± mm", "200 ± 1 ± 2", "5 px", "5 furlong", "nan", "inf mm", "5 5 mm", "± 3", "2 ± -1 mm"]
+    "text",
+    [
+        "",
+        "abc",
+        "1,5 mm",
+        "200 ± mm",
+        "200 ± 1 ± 2",
+        "5 px",
+        "5 furlong",
+        "nan",
+        "inf mm",
+        "5 5 mm",
+        "± 3",
+        "2 ± -1 mm",
+    ],
 )
 def test_refuses_with_the_name_the_text_and_the_cure(text):
     with pytest.raises(InputError) as caught:

@@ -23,7 +23,9 @@ def take(tmp_path):
         ifd = exif.get_ifd(0x8769)
         for key, value in tags.items():
             code = globals()[key]
-            (exif if code == TURN else ifd)[code] = IFDRational(round(value * 10**4), 10**4) if isinstance(value, float) else value
+            (exif if code == TURN else ifd)[code] = (
+                IFDRational(round(value * 10**4), 10**4) if isinstance(value, float) else value
+            )
         Image.new("RGB", size).save(tmp_path / name, exif=exif)
         return Photo.load(tmp_path / name)
 
@@ -136,7 +138,9 @@ def test_a_sensor_preset_takes_the_focal_length_from_the_photo(take):
         resolve_camera(take(), "1/2.3")
 
 
-@pytest.mark.parametrize("text", ["f=0px", "f=-3 px", "fov=0deg", "fov=190deg", "g=3", "f=35mm", "nonsense", "", "f=1,f=2", "f=3 kg"])
+@pytest.mark.parametrize(
+    "text", ["f=0px", "f=-3 px", "fov=0deg", "fov=190deg", "g=3", "f=35mm", "nonsense", "", "f=1,f=2", "f=3 kg"]
+)
 def test_what_cant_be_read_is_refused(take, text):
     with pytest.raises(InputError):
         resolve_camera(take(), text)

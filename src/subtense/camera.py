@@ -91,9 +91,10 @@ class Camera(Noun):
         cov, n = np.asarray(self.cov, float), 4 + self.coefficients.shape[-1]
         if cov.shape != (n, n) or not np.all(np.isfinite(cov)):
             raise InputError("cov", f"of shape {cov.shape}", f"give {n} x {n} finite numbers, in the camera's order")
-        if not np.allclose(cov, cov.T, rtol=1e-6, atol=0) or np.any(np.diag(cov) < 0):
+        scale = np.sqrt(np.diag(cov).clip(0.0))
+        if np.any(abs(cov - cov.T) > 1e-6 * np.outer(scale, scale)) or np.any(np.diag(cov) < 0):
             raise InputError("cov", "not a covariance", "it must be symmetric with variances of 0 or above")
-        object.__setattr__(self, "cov", cov)
+        object.__setattr__(self, "cov", (cov + cov.T) / 2)
 
     # -- derived -----------------------------------------------------------------------------------
 

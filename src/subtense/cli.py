@@ -160,7 +160,10 @@ class _Methods(click.Group):
 
 @main.group(cls=_Methods)
 def method() -> None:
-    """Any method by its own inputs: a camera, points, quantities, as text or @file.json."""
+    """Any method by its own inputs: a camera, points, quantities, as text or @file.json.
+
+    Nothing is assumed here: every quantity needs its ±, or the word exact.
+    """
 
 
 def _method_command(found: Method) -> click.Command:

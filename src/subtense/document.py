@@ -36,7 +36,6 @@ class Document:
         photo: name, size and SHA-256 of the picture; None where there is none.
         notes: doubts about the whole.
         shapes: for the overlay; not part of the JSON.
-        path: of the photo; never printed in full.
     """
 
     measurements: tuple[Measurement, ...] = ()

@@ -27,13 +27,13 @@ class InputError(SubtenseError, ValueError):
 
     Attributes:
         name: which value, as the user knows it ("--size", "f_px").
-        given: what it was.
+        given: what it was; None where it is missing.
         allowed: what is allowed instead.
     """
 
     def __init__(self, name: str, given: object, allowed: str) -> None:
         self.name, self.given, self.allowed = name, given, allowed
-        shown = f"{given!r}" if isinstance(given, str) else f"{given}"
+        shown = "missing" if given is None else f"{given!r}" if isinstance(given, str) else f"{given}"
         if len(shown) > 80:
             shown = shown[:77] + "..."
         super().__init__(f"{name} is {shown}; {allowed}")

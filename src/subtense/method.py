@@ -53,12 +53,23 @@ Reasons = npt.NDArray[np.int8]
 
 @dataclass(frozen=True)
 class Output:
-    """One number a method gives: the field of its result, what it is, its unit, and the name people read."""
+    """One number a method gives.
+
+    Attributes:
+        name: the field of the method's result.
+        what: range, depth, length, ...
+        unit: m, px, rad, ...
+        title: the name people read.
+        nonnegative: an interval's lower end is cut at 0.
+        digits: significant digits of u that the ends of its interval must keep (JCGM 101, 7.9.2).
+    """
 
     name: str
     what: str
     unit: str
     title: str
+    nonnegative: bool = True
+    digits: int = 2
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ def presets() -> dict[str, Preset]:
             **{name: _sensor(name, row) for name, row in table["sensor"].items()}}  # fmt: skip
 
 
-def find_preset(name: str) -> Preset:
+def find_preset(name: str, option: str = "preset") -> Preset:
     """The preset of a name or alias, whatever its case.
 
     Raises:
@@ -61,7 +61,7 @@ def find_preset(name: str) -> Preset:
     import difflib
 
     near = difflib.get_close_matches(wanted, presets(), 3, 0.4) or list(presets())[:5]
-    raise InputError("preset", name, f"known are {', '.join(near)} and more: see `subtense presets`")
+    raise InputError(option, name, f"known are {', '.join(near)} and more: see `subtense presets`")
 
 
 def _plain(name: str) -> str:

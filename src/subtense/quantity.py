@@ -270,6 +270,8 @@ class _Reader:
             if term is None or (place > 0 and unit is None):
                 raise self.refuse(f"give {WORDS.get(self.unit, 'a number')}, as in '{self.example()}'")
             unit = term.group("unit")
+            if place > 0 and unit is None:
+                raise self.refuse("name the unit of every part, as in '6 ft 2 in'")
             factor = self.factor(unit or borrowed or self.bare)
             number = float(term.group("number"))
             if not math.isfinite(number):

@@ -2,9 +2,10 @@
 
 Each side is fitted as a step that was blurred in linear light and then encoded, over the pixels of a strip along it:
 v = (low^g + (high^g - low^g) Phi((n - a - b t - c t^2) / s))^(1/g), with the encoded plateaus low and high linear in t.
-An edge located in encoded values would move by up to 0.8 blur radii into the dark side. The exponent g is that of sRGB by
-default, known to +-CURVE_U only; the asymmetry of the edges tells more of it, and what stays unknown moves all sides out or
-in together. Fitting pixels, not interpolated profiles, leaves their noise independent.
+An edge located in encoded values would move by up to 0.8 blur radii into the dark side. The exponent g is that of sRGB; a
+camera's own curve is another, so g carries u, which moves all sides out or in together. (The asymmetry of the edges would
+tell g, but only through the tails of the blur, which sharpening and demosaicing change; it misled more than it told.)
+Fitting pixels, not interpolated profiles, leaves their noise independent.
 
 Source: the blurred-edge model of W. Förstner and B. Wrobel, Photogrammetric Computer Vision, 15.3; IEC 61966-2-1 (sRGB).
 """
@@ -19,11 +20,9 @@ import numpy.typing as npt
 from .distribution import Array
 
 CURVE = 2.2
-"""Exponent of the transfer curve where nothing is known: that of sRGB over most of its range."""
-CURVE_U = 0.5
+"""Exponent of the transfer curve: that of sRGB over most of its range."""
+CURVE_U = 0.4
 """Its u: cameras draw their own contrast curves."""
-LEAST_CURVE_U = 0.2
-"""What one side can tell of the exponent at best: its blur is not exactly a normal law."""
 PIXEL_BLUR = 0.28
 """A pixel's own width as a blur radius."""
 SIDE_SIGMA_PX = 0.1
@@ -48,19 +47,15 @@ class Side:
     Attributes:
         start: (2,) px.
         along: (2,) unit vector.
-        extent: (2,) from start to end, px.
         across: (2,) unit vector, to the outside.
         bend: (3,) a, b, c.
         cov: (3, 3) of them.
         contrast: encoded high less low.
         misfit: rms residual over contrast.
         by_curve: (3,) change of a, b, c with the exponent of the transfer curve.
-        curve: the exponent that fits this side best, given what was assumed of it.
-        u_curve: its u.
     """
 
     start: Array
-    extent: Array
     along: Array
     across: Array
     bend: Array
@@ -68,14 +63,6 @@ class Side:
     contrast: float
     misfit: float
     by_curve: Array
-    curve: float
-    u_curve: float
-
-    @property
-    def tells_curve(self) -> bool:
-        """Whether the side crosses pixels at many places; one along a row shows a single phase, and no asymmetry."""
-        slope = float(abs(self.along).min()) + abs(self.bend[1])
-        return bool(slope * float(np.hypot(*self.extent)) > 2.0)
 
 
 @dataclass(frozen=True)
@@ -100,37 +87,24 @@ def refine_quad(gray: Array, corners_px: Array, module_px: float) -> Quad | None
         The refined quad, or None where a side can't be seen.
     """
     corners = np.asarray(corners_px, float)
-    half = float(np.clip(0.75 * module_px, 1.6, WIDEST_STRIP_PX))
-    curve, u_curve = CURVE, CURVE_U
-    sides = _sides(gray, corners, half, curve, u_curve)
-    if sides is None:
-        return None
-    # the sides share one curve: theirs, averaged with the assumed one, which each of them already holds
-    weight = np.array([side.tells_curve * (1 / side.u_curve**2 - 1 / CURVE_U**2) for side in sides]).clip(
-        0.0, LEAST_CURVE_U**-2
-    )
-    u_curve = float((weight.sum() + 1 / CURVE_U**2) ** -0.5)
-    own = np.array([side.curve for side in sides])
-    own = CURVE + (own - CURVE) * (weight + 1 / CURVE_U**2) / np.maximum(weight, 1e-9)  # without the assumption
-    curve = float(np.clip((np.sum(weight * own) + CURVE / CURVE_U**2) * u_curve**2, 0.8, 3.5))
-    corners = _corners(sides, np.stack([side.bend for side in sides]))
-    sides = _sides(gray, corners, half, curve, None)  # now the strips are where the sides are
-    if sides is None:
-        return None
-    corners = _corners(sides, np.stack([side.bend for side in sides]))
-    cov = _corner_cov(sides, corners, u_curve)
+    half = float(np.clip(0.5 * module_px, 1.6, WIDEST_STRIP_PX))
+    sides: list[Side] = []
+    for _ in range(2):  # the second pass has its strips where the sides are
+        sides = _sides(gray, corners, half)
+        if len(sides) < 4:
+            return None
+        corners = _corners(sides, np.stack([side.bend for side in sides]))
+    cov = _corner_cov(sides, corners)
     return Quad(corners, cov, max(side.misfit for side in sides), min(side.contrast for side in sides))
 
 
-def _sides(gray: Array, corners: Array, half: float, curve: float, u_curve: float | None) -> list[Side] | None:
+def _sides(gray: Array, corners: Array, half: float) -> list[Side]:
     middle = corners.mean(axis=0)
-    sides = [fit_side(gray, corners[i], corners[(i + 1) % 4], middle, half, curve, u_curve) for i in range(4)]
-    return None if any(side is None for side in sides) else [side for side in sides if side is not None]
+    sides = [fit_side(gray, corners[i], corners[(i + 1) % 4], middle, half) for i in range(4)]
+    return [side for side in sides if side is not None]
 
 
-def fit_side(
-    gray: Array, start: Array, end: Array, inside: Array, half: float, curve: float, u_curve: float | None
-) -> Side | None:
+def fit_side(gray: Array, start: Array, end: Array, inside: Array, half: float) -> Side | None:
     """Fit one side in a strip of +-half px, from a light outside to a dark inside.
 
     Args:
@@ -139,8 +113,6 @@ def fit_side(
         end: (2,) the other.
         inside: (2,) a point on the dark side.
         half: half width of the strip, px.
-        curve: exponent of the transfer curve.
-        u_curve: its u, to let the edge tell more of it; None to hold it.
     """
     length = float(np.hypot(*(end - start)))
     if length < 6:
@@ -156,23 +128,16 @@ def fit_side(
     if not high - low > 0.05:
         return None
     u = 2 * t / length - 1  # -1 to 1 along the side, for a well-conditioned fit
-    begin = np.array([0.0, 0.0, 0.6, low, high, 0.0, 0.0, curve, 0.0])
+    begin = np.array([0.0, 0.0, 0.6, low, high, 0.0, 0.0, CURVE, 0.0])
     free = [0, 1, 2, 3, 4, 5, 6] + ([8] if length > CURVED_FROM_PX else [])
-    x, cov, sigma = _fit(begin, free, u, n, value, None)
-    if u_curve is not None and np.all(np.isfinite(x)):
-        x, cov, sigma = _fit(x, [*free, 7], u, n, value, (curve, u_curve, sigma))
+    x, cov, sigma = _fit(begin, free, u, n, value)
     if not np.all(np.isfinite(x)) or abs(x[0]) > half or abs(x[2]) > 2.5 * half or not x[4] - x[3] > 0.05:
         return None
     return _side(x, cov, sigma, u, n, free, start, along, across, length)
 
 
-def _fit(
-    x: Array, free: list[int], u: Array, n: Array, value: Array, assumed: tuple[float, float, float] | None
-) -> tuple[Array, Array, float]:
-    """Least squares over the free parameters: all of them, their covariance, and the residuals' standard deviation.
-
-    `assumed` is (exponent, its u, standard deviation of the pixels), where the exponent is free.
-    """
+def _fit(x: Array, free: list[int], u: Array, n: Array, value: Array) -> tuple[Array, Array, float]:
+    """Least squares over the free parameters: all of them, their covariance, and the residuals' standard deviation."""
     from scipy.optimize import least_squares
 
     def whole(p: Array) -> Array:
@@ -180,25 +145,17 @@ def _fit(
         full[free] = p
         return full
 
-    scale = assumed[2] if assumed else 1.0
-
-    def residual(p: Array) -> Array:
-        r = (_edge(whole(p), u, n) - value) / scale
-        return np.append(r, (whole(p)[7] - assumed[0]) / assumed[1]) if assumed else r
-
-    def jacobian(p: Array) -> Array:
-        jac = _edge_jacobian(whole(p), u, n)[:, free] / scale
-        return np.vstack([jac, np.eye(9)[7, free] / assumed[1]]) if assumed else jac
-
-    fit = least_squares(residual, x[free], jac=jacobian, method="lm", max_nfev=60)
-    full = whole(fit.x)
-    if not np.all(np.isfinite(full)):
-        return full, np.eye(9), 1.0
-    dof = max(len(value) - len(free), 1)
-    sigma = max(float(np.sqrt(np.sum((_edge(full, u, n) - value) ** 2) / dof)), 1e-4)
+    fit = least_squares(
+        lambda p: _edge(whole(p), u, n) - value,
+        x[free],
+        lambda p: _edge_jacobian(whole(p), u, n)[:, free],
+        method="lm",
+        max_nfev=60,
+    )
+    sigma = max(float(np.sqrt(2 * fit.cost / max(len(value) - len(free), 1))), 1e-4)
     cov = np.zeros((9, 9))
-    cov[np.ix_(free, free)] = np.linalg.pinv(fit.jac.T @ fit.jac) * (1.0 if assumed else sigma**2)
-    return full, cov, sigma
+    cov[np.ix_(free, free)] = np.linalg.pinv(fit.jac.T @ fit.jac) * sigma**2
+    return whole(fit.x), cov, sigma
 
 
 def _side(
@@ -212,8 +169,8 @@ def _side(
     k = 2 / length  # from u in -1..1 to t in 0..length: u = k t - 1
     change = np.array([[1, -1, 1], [0, k, -2 * k], [0, 0, k * k]])
     contrast = float(x[4] - x[3])
-    return Side(start, length * along, along, across, change @ x[keep], change @ cov[np.ix_(keep, keep)] @ change.T, contrast,
-                sigma / contrast, change @ by_curve[keep], float(x[7]), float(np.sqrt(cov[7, 7])))  # fmt: skip
+    return Side(start, along, across, change @ x[keep], change @ cov[np.ix_(keep, keep)] @ change.T, contrast,
+                sigma / contrast, change @ by_curve[keep])  # fmt: skip
 
 
 def _strip(
@@ -293,7 +250,7 @@ def _tangent(side: Side, bend: Array, t: float) -> Array:
     return np.asarray(side.along + (bend[1] + 2 * bend[2] * t) * side.across)
 
 
-def _corner_cov(sides: list[Side], corners: Array, u_curve: float) -> Array:
+def _corner_cov(sides: list[Side], corners: Array) -> Array:
     """(8, 8) from the sides' covariances, the transfer curve (all sides together) and what the model leaves out."""
     bends = np.stack([side.bend for side in sides])
     cov = np.eye(8) * CORNER_SIGMA_PX**2
@@ -306,6 +263,6 @@ def _corner_cov(sides: list[Side], corners: Array, u_curve: float) -> Array:
             moved[i, j] += sd[j]
             jac[:, j] = (_corners(sides, moved) - corners).ravel() / sd[j]
         cov += jac @ own @ jac.T
-    shifted = bends + u_curve * np.stack([side.by_curve for side in sides])
+    shifted = bends + CURVE_U * np.stack([side.by_curve for side in sides])
     outward = (_corners(sides, shifted) - corners).ravel()
     return np.asarray(cov + np.outer(outward, outward))

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..camera import Camera
 from ..errors import FileFormatError, InputError
 from ..hypothesis import Hypothesis, scaled_to
 from ..photo import Photo
+from ..quantity import Note
 
 NAME = "calibration_file"
 MOST_BYTES = 2**20
+ASSUMED_FOCAL = 0.005
+"""Relative u of the focal length of a calibration that does not tell it."""
+ASSUMED_CENTRE = 0.005
+"""u of its principal point, in picture widths."""
 
 
 def camera(path: Path, photo: Photo) -> Hypothesis:
@@ -21,11 +29,24 @@ def camera(path: Path, photo: Photo) -> Hypothesis:
     Raises:
         FileFormatError: no such file, not a camera, or a camera of another picture size.
     """
-    found = scaled_to(read(path), photo)
+    own = read(path)
+    doubtful = own.cov is None
+    found = scaled_to(_with_assumed_u(own) if doubtful else own, photo)
     if isinstance(found, str):
         raise FileFormatError(path, f"{found}; calibrate at the photo's size or give a photo of the calibration's")
     camera, notes = found
+    if doubtful:
+        text = f"the calibration has no covariance; its focal length is taken to {ASSUMED_FOCAL:.1%}, its centre to {ASSUMED_CENTRE:.1%}"
+        cure = "calibrate with a tool that tells it, or write a cov of zeros if it is exact"
+        notes = (*notes, Note("calibration_without_uncertainty", text.replace("%", " %"), cure))
     return Hypothesis(NAME, camera, f"calibration file {path.name}", notes)
+
+
+def _with_assumed_u(camera: Camera) -> Camera:
+    cov = np.zeros((4 + camera.coefficients.shape[-1],) * 2)
+    cov[0, 0] = (ASSUMED_FOCAL * float(camera.f_px)) ** 2
+    cov[2, 2] = cov[3, 3] = (ASSUMED_CENTRE * camera.width_px) ** 2
+    return replace(camera, cov=cov, source=f"{camera.source}; u assumed", id=None)
 
 
 def read(path: Path) -> Camera:
@@ -38,7 +59,7 @@ def read(path: Path) -> Camera:
         data: Any = json.loads(path.read_text("utf-8"))
     except (ValueError, RecursionError):
         raise FileFormatError(
-            path, "is not JSON; give a camera as `subtense camera PHOTO --format json` prints it"
+            path, "is not JSON; give a camera as `subtense camera PHOTO --format json` prints it (no YAML, XML)"
         ) from None
     if isinstance(data, dict) and isinstance(data.get("camera"), dict):
         data = data["camera"]

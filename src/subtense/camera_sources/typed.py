@@ -29,7 +29,9 @@ def camera(text: str, photo: Photo) -> Hypothesis:
         InputError: neither key=value pairs nor a known name, or something missing.
     """
     found = _from_pairs(text, photo) if "=" in text else _from_preset(text, photo)
-    return Hypothesis(NAME, found, found.source)
+    # a focal length in pixels is of the picture at hand; every other text is of the whole, unzoomed sensor
+    notes = tagged_size(photo).notes if found.nominal_focal_m else ()
+    return Hypothesis(NAME, found, found.source, notes)
 
 
 def _from_pairs(text: str, photo: Photo) -> Camera:
@@ -78,7 +80,8 @@ def _from_field_of_view(text: str, photo: Photo) -> Camera:
     f_px = photo.width_px / 2 / math.tan(angle / 2)
     u = float(fov.u) * photo.width_px / 4 / math.sin(angle / 2) ** 2
     return unknown_lens(photo.width_px, photo.height_px, f_px, math.hypot(u, assumptions.NOMINAL_FOCAL * f_px),
-                        f"field of view across the width, {fov.source}")  # fmt: skip
+                        f"field of view across the width, {fov.source}",
+                        photo.metadata.focal_mm / 1000 if photo.metadata.focal_mm else None)  # fmt: skip
 
 
 def _from_lengths(focal: Quantity, sensor: Quantity, photo: Photo, source: str) -> Camera:
@@ -100,7 +103,7 @@ def _tagged_focal(text: str, photo: Photo) -> Quantity:
 
 
 def _from_preset(text: str, photo: Photo) -> Camera:
-    preset = find_preset(text)
+    preset = find_preset(text, "--camera")
     if preset.focal_length is None:
         made = _from_lengths(
             _tagged_focal(text, photo), preset.sensor_width, photo, f"preset {preset.name}, EXIF focal length"

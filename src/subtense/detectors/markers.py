@@ -25,6 +25,8 @@ FAMILIES: dict[str, tuple[str, int]] = {
 }  # fmt: skip
 """Family: OpenCV's name, and modules across its black square. Earlier families win where a marker reads in two."""
 
+WEAK = ("16h5", "4x4")
+"""Families of 16 bits."""
 WORST_MISFIT = 0.25
 """Rms residual of a side over its contrast beyond which there is no edge."""
 
@@ -57,10 +59,14 @@ def markers(photo: Photo, family: str | None = None) -> tuple[Observation, ...]:
 
 
 def _candidates(cv2: Any, gray: npt.NDArray[np.uint8], families: list[str]) -> Iterator[tuple[str, int, Array]]:
-    """Exact readings first; only where there is none at all, readings with corrected bits."""
-    for correction in (0.0, 0.5):
+    """Exact readings first; then, only where there is none, those of weak families, and readings with corrected bits.
+
+    Every 16th dark square reads as some marker of 16 bits, so such families are believed only in want of a stronger one.
+    """
+    strong = [name for name in families if name not in WEAK]
+    for correction, names in ((0.0, strong), (0.0, families), (0.5, strong), (0.5, families)):
         count = 0
-        for name in families:
+        for name in names:
             for number, corners in _detected(cv2, gray, name, correction):
                 count += 1
                 yield name, number, corners

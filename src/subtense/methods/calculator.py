@@ -41,10 +41,10 @@ class Inputs:
     Attributes:
         sensor_width: width of the sensor, m.
         image_width: picture width, px.
-        focal_length: m, or None to solve for it.
-        size: real size of the object, m, or None.
-        extent: its length in the picture, px, or None.
-        distance: depth along the axis, m, or None.
+        focal_length: m; leave it out to solve for it.
+        size: real size of the object, m; or leave it out.
+        extent: its length in the picture, px; or leave it out.
+        distance: depth along the axis, m; or leave it out.
         along: whether the extent was measured along the "width" or the "height" of the picture.
         aspect: pixel width over pixel height.
         tilt: of the object to the image plane, rad.

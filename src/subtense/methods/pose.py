@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -28,6 +29,8 @@ from ..target import Target
 
 STEPS = 2
 """Gauss-Newton steps of a moved scene from the nominal solution."""
+SETTLED = 1e-13
+"""A step of the nominal solution (rad, m) below which it has converged."""
 TELLING_RAD = math.radians(3.0)
 """Two solutions whose faces differ by less are not called ambiguous."""
 LEAST_WEIGHT = 0.01
@@ -102,6 +105,7 @@ class Start:
         return float(np.arctan2(np.linalg.norm(np.cross(one, two)), one @ two))
 
 
+@lru_cache(maxsize=8)
 def start(inputs: Inputs) -> Start:
     """Solve the nominal scene; no pose at all leaves `poses` empty."""
     points, seen = inputs.target.points_m, _normalised(inputs.camera, inputs.points)
@@ -206,6 +210,8 @@ def _refined(pose: Pose, points_m: Array, seen: Array, whiten: Array, steps: int
         step = -np.linalg.solve(np.nan_to_num(normal + damp, nan=1.0, posinf=1.0), np.nan_to_num(gradient))[..., 0]
         rotation = rotation_from_vector(step[..., :3]) @ rotation
         shift = shift + step[..., 3:]
+        if np.max(abs(step)) < SETTLED:
+            break
     return Pose(rotation, shift)
 
 
@@ -289,7 +295,7 @@ def example() -> Inputs:
 def _outputs() -> tuple[Output, ...]:
     return (Output("range_m", "range", "m", "range (from the entrance pupil)"),
             Output("depth_m", "depth", "m", "depth (along the axis)"),
-            Output("tilt_rad", "tilt", "rad", "tilt to the line of sight"))  # fmt: skip
+            Output("tilt_rad", "tilt", "rad", "tilt to the line of sight", digits=1))  # fmt: skip
 
 
 METHOD = Method(

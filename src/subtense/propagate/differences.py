@@ -40,6 +40,7 @@ class Propagated:
         bend: (o, ...) how far an interval end is expected to be off, in u.
         reason: (...) codes of `Reason`.
         quadratic: u and interval of each output from the quadratic response; empty for rows.
+        curvature: (l, o) variance that each line's own second differences add; None for rows.
     """
 
     names: tuple[str, ...]
@@ -55,6 +56,7 @@ class Propagated:
     bend: Array
     reason: npt.NDArray[np.int8]
     quadratic: tuple[_Bent, ...] = ()
+    curvature: Array | None = None
 
 
 def first_order(
@@ -94,7 +96,7 @@ def scene(model: Model, space: Space, level: float) -> Propagated:
     bent = [_quadratic(s[o], hessian[o], space.lines, level) for o in range(len(u))]
     return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, y0 - k * u, y0 + k * u, dof,
                       contributions, s @ s.T, u2, np.array([b.bend for b in bent]), np.asarray(reason[0]),
-                      tuple(bent))  # fmt: skip
+                      tuple(bent), _own_curvature(space.lines, hessian))  # fmt: skip
 
 
 def _offsets(m: int, pairs: Sequence[tuple[int, int]]) -> Array:
@@ -141,6 +143,22 @@ def _by_line(lines: Sequence[Line], s: Array) -> Array:
         rows.append(part[:, 0] if line.count == 1 else np.sqrt(np.sum(part**2, axis=1)))
         first += line.count
     return np.array(rows).reshape(len(lines), len(s))
+
+
+def _own_curvature(lines: Sequence[Line], hessian: Array) -> Array:
+    """(l, o) variance that the second differences within each line add to the first-order one.
+
+    A variable z of kurtosis 3 + e has Var(h z^2 / 2) = h^2 (2 + e) / 4.
+    """
+    rows, first = [], 0
+    for line in lines:
+        block = hessian[:, first : first + line.count, first : first + line.count]
+        excess = np.array([0.0 if law.name == "t" else law.excess_kurtosis for law in line.laws])
+        own = np.einsum("oii->oi", block) ** 2 @ (2 + excess) / 4
+        mixed = (np.sum(block**2, axis=(1, 2)) - np.sum(np.einsum("oii->oi", block) ** 2, axis=1)) / 2
+        rows.append(own + mixed)
+        first += line.count
+    return np.array(rows).reshape(len(lines), len(hessian))
 
 
 def effective_dof(u: Array, contributions: Array, dof: Array) -> Array:

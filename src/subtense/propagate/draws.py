@@ -100,6 +100,7 @@ def sample(
 
 
 def sample_space(model: Model, space: Space, draws: int, rng: np.random.Generator) -> Draws:
+    """A fixed number of draws of a space, chunk by chunk."""
     values = np.empty((len(model.names), draws))
     reason = np.empty(draws, np.int8)
     for first in range(0, draws, CHUNK):
@@ -122,7 +123,9 @@ def monte_carlo(
     return adaptive(model_of(method, inputs), space, level, seed)
 
 
-def adaptive(model: Model, space: Space, level: float, seed: int, wanted: Sequence[int] | None = None) -> Draws:
+def adaptive(
+    model: Model, space: Space, level: float, seed: int, wanted: Sequence[int] | None = None, digits: int = 2
+) -> Draws:
     """Blocks of draws until the statistics of the wanted outputs (all by default) are steady."""
     outputs = list(range(len(model.names)) if wanted is None else wanted)
     rng = np.random.default_rng(seed)
@@ -134,21 +137,21 @@ def adaptive(model: Model, space: Space, level: float, seed: int, wanted: Sequen
         ends = np.array([block.interval(o, level) for o in outputs])
         chosen = Draws(block.names, block.values[outputs], block.reason)
         statistics.append(np.stack([chosen.mean, chosen.u, ends[:, 0], ends[:, 1]]))
-        stable = len(blocks) >= FEWEST_BLOCKS and _steady(np.stack(statistics))
+        stable = len(blocks) >= FEWEST_BLOCKS and _steady(np.stack(statistics), digits)
         if stable or len(blocks) * BLOCK >= model.most_draws:
             values = np.concatenate([b.values for b in blocks], axis=1)
             return Draws(model.names, values, np.concatenate([b.reason for b in blocks]), stable)
 
 
-def _steady(statistics: Array) -> bool:
+def _steady(statistics: Array, digits: int) -> bool:
     """Whether twice the standard deviation of each averaged statistic is below the tolerance; (blocks, 4, o)."""
     spread = 2 * np.std(np.where(np.isfinite(statistics), statistics, 0.0), axis=0, ddof=1) / math.sqrt(len(statistics))
-    allowed = np.array([tolerance(float(u)) for u in np.mean(statistics[:, 1], axis=0)])
+    allowed = np.array([tolerance(float(u), digits) for u in np.mean(statistics[:, 1], axis=0)])
     return bool(np.all(spread <= allowed))
 
 
-def tolerance(u: float) -> float:
-    """Half a unit of the second significant digit of u (JCGM 101, 7.9.2)."""
+def tolerance(u: float, digits: int = 2) -> float:
+    """Half a unit of the last significant digit of u (JCGM 101, 7.9.2)."""
     if not (u > 0 and math.isfinite(u)):
         return math.inf
-    return float(0.05 * 10.0 ** math.floor(math.log10(u) + 1e-12))
+    return float(5.0 * 10.0 ** (math.floor(math.log10(u) + 1e-12) - digits))

@@ -15,7 +15,7 @@ from ..method import Method, Output, Reason
 from ..quantity import Contribution, Measurement, Note
 from ..space import Line, Space
 from .differences import Propagated, scene
-from .draws import Draws, adaptive, tolerance
+from .draws import Draws, adaptive, sample_space, tolerance
 from .model import Model, evaluate_at, model_of
 
 NEARLY_NORMAL = 0.4
@@ -23,10 +23,19 @@ NEARLY_NORMAL = 0.4
 
 
 def measure(
-    method: Method, inputs: Any, *, level: float = 0.95, seed: int = 0, label: str = "",
+    method: Method, inputs: Any, *, level: float = 0.95, seed: int = 0, draws: int | None = None, label: str = "",
     given: Mapping[str, Any] | None = None,
 ) -> tuple[Measurement, ...]:  # fmt: skip
     """The outputs of a method as measurements, headline first.
+
+    Args:
+        method: of METHODS.
+        inputs: its Inputs, one scene.
+        level: coverage of the intervals.
+        seed: of the draws, where they are needed.
+        draws: how many; None for as many as the adaptive procedure wants.
+        label: which thing is measured.
+        given: what to keep with each measurement, to measure again.
 
     Raises:
         GeometryError: this view has no finite answer.
@@ -44,15 +53,21 @@ def measure(
         raise GeometryError(reason.text, code=reason.name.lower())
     result = method.function(inputs, *((method.start(inputs),) if method.start else ()))
     notes = method.notes(inputs, result)
-    answers = [_without_draws(model, space, nominal, o, level) for o in range(len(method.outputs))]
+    answers = [
+        _without_draws(model, space, nominal, o, level, output.digits) for o, output in enumerate(method.outputs)
+    ]
     bent = [o for o, answer in enumerate(answers) if answer is None]
-    draws = adaptive(model, space, level, seed, bent) if bent else None
+    drawn = None
+    if bent:
+        digits = max(method.outputs[o].digits for o in bent)
+        fixed = None if draws is None else sample_space(model, space, draws, np.random.default_rng(seed))
+        drawn = fixed or adaptive(model, space, level, seed, bent, digits)
     found = []
     for o, output in enumerate(method.outputs):
         answer = answers[o]
         if answer is None:
-            assert draws is not None
-            answer = _drawn(draws, o, level, output)
+            assert drawn is not None
+            answer = _drawn(drawn, o, level, output)
         found.append(_measurement(method, output, nominal, o, answer, space, level, label, notes, given or {}))
     return tuple(found)
 
@@ -68,10 +83,12 @@ class _Answer:
     notes: tuple[Note, ...] = ()
 
 
-def _without_draws(model: Model, space: Space, nominal: Propagated, o: int, level: float) -> _Answer | None:
+def _without_draws(
+    model: Model, space: Space, nominal: Propagated, o: int, level: float, digits: int
+) -> _Answer | None:
     """The answer of the cheapest evaluation that keeps the tolerance of JCGM 101, 8.2; None where draws are needed."""
     u, bend = float(nominal.u[o]), float(nominal.bend[o])
-    allowed = tolerance(u) / u if u > 0 else 0.0
+    allowed = tolerance(u, digits) / u if u > 0 else 0.0
     if bend <= allowed:
         return _Answer(u, float(nominal.low[o]), float(nominal.high[o]))
     quadratic, value = nominal.quadratic[o], float(nominal.value[o])
@@ -106,7 +123,9 @@ def _mapped(model: Model, space: Space, output: int, variable: int, level: float
 
 
 CURE = "make the pixel extent larger or better known: come closer, use a longer lens or a larger object"
-_HEAVY_TAIL = Note("heavy_tail", "the far tail is so long that a standard deviation has no meaning; use the interval", CURE)
+_HEAVY_TAIL = Note(
+    "heavy_tail", "the far tail is so long that a standard deviation has no meaning; use the interval", CURE
+)
 
 
 def _drawn(draws: Draws, o: int, level: float, output: Output) -> _Answer:
@@ -147,28 +166,37 @@ def _measurement(
     label: str, notes: tuple[Note, ...], given: Mapping[str, Any],
 ) -> Measurement:  # fmt: skip
     def limit(x: float) -> float | None:
+        if output.nonnegative:  # no length is below 0, whatever a symmetric interval says
+            x = max(x, 0.0) if x > -math.inf else 0.0
         return x if math.isfinite(x) else None
 
-    budget = _budget(space.lines, nominal.contributions[:, o], answer.u)
+    curvature = nominal.curvature[:, o] if nominal.curvature is not None and answer.evaluation != "first order" else 0.0
+    budget = _budget(space.lines, nominal.contributions[:, o], curvature, answer.u)
     return Measurement(
         output.what, float(nominal.value[o]), answer.u, limit(answer.low), limit(answer.high), output.unit,
         method.name, level, label, answer.evaluation, budget, notes + answer.notes, given=given,
     )  # fmt: skip
 
 
-def _budget(lines: Sequence[Line], contributions: Array, u: float | None) -> tuple[Contribution, ...]:
-    """Lines with their shares, largest first; `interaction` takes what draws have beyond first order."""
-    squared = contributions**2
-    first_order_variance = float(np.sum(squared))
-    total = max(u**2 if u is not None else 0.0, first_order_variance)
+def _budget(
+    lines: Sequence[Line], contributions: Array, curvature: Array | float, u: float | None
+) -> tuple[Contribution, ...]:
+    """Lines with their shares, largest first.
+
+    A line's variance is its first-order one and that of its own curvature; `interaction` takes what draws have beyond.
+    """
+    squared = np.nan_to_num(contributions**2 + curvature)
+    own = float(np.sum(squared))
+    total = max(u**2 if u is not None else 0.0, own)
     if not total > 0:
         return ()
     found = [
-        Contribution(line.name, line.source, float(c), float(q / total))
+        Contribution(line.name, line.source, math.copysign(math.sqrt(q), c), float(q / total))
         for line, c, q in zip(lines, contributions, squared, strict=True)
         if q > 0
     ]
-    rest = total - first_order_variance
+    rest = total - own
     if rest > 1e-9 * total:
-        found.append(Contribution("interaction", "what draws have beyond first order", math.sqrt(rest), rest / total))
+        text = "what the lines have together, beyond their own"
+        found.append(Contribution("interaction", text, math.sqrt(rest), rest / total))
     return tuple(sorted(found, key=lambda c: -c.share))

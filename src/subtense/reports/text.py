@@ -75,15 +75,14 @@ def headline(m: Measurement) -> str:
 
     Scales, angles and pixels keep their digits: people carry them on into other calculations.
     """
-    value = number(m.value, m.unit, m.u) if m.unit == "m" else _unrounded(m)
+    value = number(m.value, m.unit, _doubt(m)) if m.unit == "m" else _unrounded(m)
     if m.u == 0:
         return f"{value}   exact"
     level = f"{100 * m.level:g} %"
     if m.low is None and m.high is None:
         return f"{value}   {level}: open on both sides"
     name, factor = fitting_unit(m.value, m.unit)
-    doubt = m.u if m.u is not None else abs((m.high if m.high is not None else m.value) - (m.low or 0.0)) / 4
-    decimals = max(digits_for(doubt / factor), 0)
+    decimals = max(digits_for(_doubt(m) / factor), 0)
     space = "" if name == "°" else " "
     low, high = (None if x is None else grouped(x / factor, decimals) for x in (m.low, m.high))
     if high is None:
@@ -92,6 +91,14 @@ def headline(m: Measurement) -> str:
         return f"{value}   {level}: up to {high}{space}{name}, near limit open"
     u = "" if m.u is None else f"   (u {_short(m.u, m.unit, m.value)})"
     return f"{value}   {level}: {low} to {high}{space}{name}{u}"
+
+
+def _doubt(m: Measurement) -> float:
+    """u, or what stands for it in rounding where it has no meaning."""
+    if m.u is not None:
+        return m.u
+    ends = [end for end in (m.low, m.high) if end is not None]
+    return max((abs(m.value - end) for end in ends), default=abs(m.value)) / 2
 
 
 def _short(u: float, unit: str, reference: float) -> str:

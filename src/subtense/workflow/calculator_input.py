@@ -37,12 +37,10 @@ def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity |
         InputError: a text that can't be read, or something missing: which, and what to give.
     """
     said = {name: _read(name, text.get(name)) for name in _HOW}
-    preset = find_preset(text["preset"]) if text.get("preset") else None  # type: ignore[arg-type]
+    preset = find_preset(text["preset"], "--preset") if text.get("preset") else None  # type: ignore[arg-type]
     image_width = said["image_width"] or (preset.image_width if preset else None)
     if image_width is None:
-        raise InputError(
-            "--image-width", "missing", "give the picture's width in pixels, or a --preset of a camera class"
-        )
+        raise InputError("--image-width", None, "give the picture's width in pixels, or a --preset of a camera class")
     unknowns: dict[str, Any] = {
         "focal_length": said["focal"], "size": said["size"], "extent": said["extent"], "distance": said["distance"],
     }  # fmt: skip
@@ -79,10 +77,10 @@ def _sensor_width(said: Mapping[str, Quantity | None], preset: Preset | None, im
     other = said["sensor_height"] or said["sensor_diagonal"]
     if other is None:
         if preset is None:
-            raise InputError("--sensor-width", "missing", "give it, its height or diagonal, or a --preset")
+            raise InputError("--sensor-width", None, "give it, its height or diagonal, or a --preset")
         return preset.sensor_width
     if said["image_height"] is None:
-        raise InputError("--image-height", "missing", "the sensor's width follows from its height or diagonal by it")
+        raise InputError("--image-height", None, "the sensor's width follows from its height or diagonal by it")
     aspect = float(said["aspect"].value) if said["aspect"] else 1.0
     ratio = float(image_width.value) * aspect / float(said["image_height"].value)
     return other.scaled(ratio if said["sensor_height"] else ratio / (1 + ratio * ratio) ** 0.5)

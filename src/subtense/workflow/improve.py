@@ -9,7 +9,7 @@ from ..quantity import Measurement
 from ..reports.rounding import digits_for, fitting_unit, grouped
 
 CURES = (
-    ("focal length", "calibrate the camera at this focus (a board of 20 pictures), or measure one known distance"),
+    ("focal length", "calibrate the camera at this focus (20 pictures of a board), or measure one known distance"),
     ("pixel aspect", "calibrate the camera"),
     ("principal point", "calibrate the camera, or keep the object near the middle of the picture"),
     ("lens distortion", "calibrate the camera, or keep the object near the middle of the picture"),

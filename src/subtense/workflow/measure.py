@@ -11,13 +11,14 @@ import numpy as np
 from .. import propagate
 from ..assumptions import unknown_tilt
 from ..detectors.markers import FAMILIES, markers
+from ..distribution import normal_quantile
 from ..document import Document, Shape
 from ..errors import FileFormatError, InputError, NothingFoundError
 from ..method import Method
 from ..methods import known_size, pose
 from ..observation import Observation
 from ..photo import Photo
-from ..quantity import Measurement, Quantity
+from ..quantity import Contribution, Measurement, Quantity
 from ..target import Target
 from .given import given, inputs_from_json, inputs_from_text, read_json
 from .improve import improved
@@ -124,9 +125,17 @@ def measure_inputs(
     return Document(improved(tuple(found)), {**camera.to_json(), "u_f_px": camera.u_f_px} if camera else None)
 
 
-def camera_document(photo: Photo, given_camera: str | None = None) -> Document:
-    """The camera of a photo alone."""
-    return _document(photo, resolve_camera(photo, given_camera), [], [])
+def camera_document(photo: Photo, given_camera: str | None = None, *, level: float = 0.95) -> Document:
+    """The camera of a photo alone: its focal length in pixels, and what every source says."""
+    resolved = resolve_camera(photo, given_camera)
+    camera = resolved.camera
+    half = normal_quantile(0.5 + level / 2) * camera.u_f_px
+    f = float(camera.f_px)
+    budget = (Contribution("focal length", camera.source, camera.u_f_px, 1.0),) if half else ()
+    m = Measurement(
+        "focal_length_px", f, camera.u_f_px, f - half, f + half, "px", resolved.chosen.source, level, budget=budget
+    )
+    return _document(photo, resolved, [m], [])
 
 
 def _measured(method: Method, inputs: object, label: str, level: float, seed: int) -> list[Measurement]:

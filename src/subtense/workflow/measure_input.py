@@ -25,11 +25,11 @@ def measure_document(
         InputError: nothing to measure, or a text that can't be read.
     """
     if not lines and marker_size is None:
-        raise InputError("what to measure", "missing", "give --line X1,Y1,X2,Y2 with --size, or --marker-size")
+        raise InputError("--line or --marker-size", None, "give --line X1,Y1,X2,Y2 with --size, or --marker-size")
     if lines and not sizes:
-        raise InputError("--size", "missing", "give the real size of what the line spans, as --size '210 mm'")
+        raise InputError("--size", None, "give the real size of what the line spans, as --size '210 mm'")
     if sizes and not lines:
-        raise InputError("--line", "missing", "give the two ends of what has this size, as --line 120,80,640,80")
+        raise InputError("--line", None, "give the two ends of what has this size, as --line 120,80,640,80")
     found = []
     if lines:
         ends = [Observation.parse(text, name="--line", count=2) for text in lines]

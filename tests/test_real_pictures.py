@@ -1,0 +1,112 @@
+"""Real pictures with truth, never tuned to; skipped where the data is not at hand."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from subtense import Photo, Quantity, UnknownCameraError, measure_lines, resolve_camera
+from subtense.cli import main
+from subtense.observation import Observation
+
+pytestmark = pytest.mark.opencv
+
+
+def ends_of_green(photo):
+    """Left and right end of the green strips, as the sub-pixel places where the mask's columns begin and end."""
+    rgb = photo.pixels.astype(int)
+    green = (rgb[..., 1] > 100) & (rgb[..., 1] > rgb[..., 0] + 80)  # the lit strips, not their glow
+    columns = np.flatnonzero(green.sum(axis=0) >= 2)
+    rows = np.flatnonzero(green.sum(axis=1) >= 1)
+    y = float(rows.mean())
+    return np.array([[columns[0] - 0.5, y], [columns[-1] + 0.5, y]])
+
+
+def test_frc_2019_targets_by_their_width(shared_data):
+    folder = shared_data / "known_size" / "frc2019"
+    truth = json.loads((folder / "truth.json").read_text())
+    size = Quantity.interval(truth["known_width_m"], 0.002, "m")
+    for name, distance in truth["images"].items():
+        photo = Photo.load(folder / name)
+        document = measure_lines(
+            photo, [Observation(ends_of_green(photo), 0.7)], [size], camera=f"f={truth['f_px']} ± 3 px"
+        )
+        depth = next(m for m in document.measurements if m.what == "depth")
+        assert depth.value == pytest.approx(distance, rel=0.025), name
+        assert depth.low < distance < depth.high, name
+
+
+def test_april_vision_tags_by_the_command_line(shared_data, tmp_path):
+    folder = shared_data / "fiducial" / "april_vision_synth"
+    camera = {
+        "width_px": 800,
+        "height_px": 800,
+        "f_px": 1293.0912575,
+        "cx_px": 399.5,
+        "cy_px": 399.5,
+        "cov": np.zeros((4, 4)).tolist(),
+    }
+    (tmp_path / "camera.json").write_text(json.dumps(camera))
+    rows = {int(row["Index"]): row for row in csv.DictReader((folder / "locations.csv").read_text().splitlines())}
+    checked = 0
+    for path in sorted(folder.glob("img-*.png")):
+        words = [
+            "measure",
+            path,
+            "--marker-size",
+            "200 mm exact",
+            "--camera",
+            tmp_path / "camera.json",
+            "--format",
+            "json",
+        ]
+        result = CliRunner().invoke(main, [str(w) for w in words], catch_exceptions=False)
+        found = json.loads(result.output)["measurements"][0]
+        true = float(rows[int(path.stem[-3:])]["r"])
+        assert found["label"] == "36h11 id 14"
+        assert found["value"] == pytest.approx(true, rel=0.005), path.name
+        assert abs(found["value"] - true) < 3 * found["u"], path.name
+        checked += 1
+    assert checked == 18
+
+
+@pytest.mark.parametrize(
+    ("file", "f_px"),
+    [
+        ("exif_intrinsics/iphone8plus/IMG_1443.jpg", 3280.1),
+        ("exif_intrinsics/kodak_sceaux/100_7100.JPG", 2905.88),
+        ("ground_plane/drone_nadir/DJI_0024.JPG", 2344.0),
+    ],
+)
+def test_the_calibrated_focal_length_lies_in_the_interval_from_the_metadata(shared_data, file, f_px):
+    camera = resolve_camera(Photo.load(shared_data / file)).camera
+    assert abs(camera.f_px - f_px) < 1.96 * camera.u_f_px
+
+
+def test_every_exif_sample_gives_a_camera_or_a_named_reason(shared_data):
+    for path in sorted((shared_data / "exif_intrinsics" / "exif_samples").glob("*.jpg")):
+        try:
+            camera = resolve_camera(Photo.load(path)).camera
+        except UnknownCameraError as error:
+            assert path.name in str(error) and len(error.tried) == 2
+        else:
+            assert 0.005 < camera.u_f_px / camera.f_px < 0.3
+
+
+def test_pictures_stored_in_all_orientations_are_upright(shared_data):
+    for kind, upright in (("landscape", (600, 450)), ("portrait", (450, 600))):
+        photos = [
+            Photo.load(p) for p in sorted((shared_data / "exif_intrinsics" / "exif_samples").glob(f"{kind}_*.jpg"))
+        ]
+        assert {(p.width_px, p.height_px) for p in photos} == {upright}
+        first = photos[0].pixels.astype(float)
+        assert all(np.corrcoef(first.ravel(), p.pixels.astype(float).ravel())[0, 1] > 0.9 for p in photos)
+
+
+def test_aruco_markers_of_the_tutorials_are_found(shared_data):
+    from subtense.detectors.markers import markers
+
+    found = markers(Photo.load(shared_data / "fiducial" / "opencv_aruco" / "singlemarkersoriginal.jpg"))
+    assert {o.label for o in found} == {f"6x6 id {n}" for n in (23, 40, 62, 98, 124, 203)}
