@@ -7,7 +7,29 @@ import pytest
 
 import subtense
 
-NAMES = ["Camera", "Document", "FileFormatError", "GeometryError", "InputError", "METHODS", "Measurement", "Method", "MissingExtraError", "NothingFoundError", "Observation", "Photo", "Quantity", "SubtenseError", "Target", "UnknownCameraError", "calculate", "measure_lines", "measure_markers", "propagate", "resolve_camera"]
+NAMES = [
+    "Camera",
+    "Document",
+    "FileFormatError",
+    "GeometryError",
+    "InputError",
+    "METHODS",
+    "Measurement",
+    "Method",
+    "MissingExtraError",
+    "NothingFoundError",
+    "Observation",
+    "Photo",
+    "Quantity",
+    "SubtenseError",
+    "Target",
+    "UnknownCameraError",
+    "calculate",
+    "measure_lines",
+    "measure_markers",
+    "propagate",
+    "resolve_camera",
+]
 
 
 def test_the_names_are_these():

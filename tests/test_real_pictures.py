@@ -87,12 +87,13 @@ def test_the_calibrated_focal_length_lies_in_the_interval_from_the_metadata(shar
 
 def test_every_exif_sample_gives_a_camera_or_a_named_reason(shared_data):
     for path in sorted((shared_data / "exif_intrinsics" / "exif_samples").glob("*.jpg")):
-        try:
-            camera = resolve_camera(Photo.load(path)).camera
-        except UnknownCameraError as error:
-            assert path.name in str(error) and len(error.tried) == 2
-        else:
+        photo = Photo.load(path)
+        if photo.metadata.f35_mm or path.name == "Canon_PowerShot_S40.jpg":
+            camera = resolve_camera(photo).camera
             assert 0.005 < camera.u_f_px / camera.f_px < 0.3
+        else:
+            with pytest.raises(UnknownCameraError, match=path.name):
+                resolve_camera(photo)
 
 
 def test_pictures_stored_in_all_orientations_are_upright(shared_data):

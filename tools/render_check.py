@@ -71,9 +71,7 @@ def measured_corners(picture: np.ndarray, camera: Camera, world: np.ndarray) -> 
     """Corners of a planar quadrilateral from four fitted edges, in pixels."""
     eye = camera.to_camera(world)
     corners = eye[:, :2] / eye[:, 2:]
-    lines = [
-        fit_line(edge_points(picture, camera, corners[i], corners[(i + 1) % 4])) for i in range(4)
-    ]
+    lines = [fit_line(edge_points(picture, camera, corners[i], corners[(i + 1) % 4])) for i in range(4)]
     found = []
     for i in range(4):
         (m0, n0), (m1, n1) = lines[i - 1], lines[i]
@@ -120,10 +118,7 @@ def check_person(folder: Path, entry: dict) -> None:
 def check_stereo(folder: Path, left: dict, right: dict) -> list[float]:
     """Match the textured points from left to right and compare with the truth."""
     points = [p for t in left["objects"] for p in t["points"] if "pixel_right_px" in p]
-    pictures = [
-        np.asarray(Image.open(folder / e["file"]).convert("L")).astype(np.uint8)
-        for e in (left, right)
-    ]
+    pictures = [np.asarray(Image.open(folder / e["file"]).convert("L")).astype(np.uint8) for e in (left, right)]
     a = np.array([p["pixel_px"] for p in points], np.float32).reshape(-1, 1, 2)
     b = np.array([p["pixel_right_px"] for p in points], np.float32).reshape(-1, 1, 2)
     stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 100, 1e-4)

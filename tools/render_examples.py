@@ -116,10 +116,7 @@ def picture_truth(shot: Shot) -> dict:
                 "what": thing.what,
                 "size_m": thing.size_m,
                 "checked": thing.check,
-                "points": [
-                    point_truth(shot, name, np.asarray(p, float))
-                    for name, p in thing.points.items()
-                ],
+                "points": [point_truth(shot, name, np.asarray(p, float)) for name, p in thing.points.items()],
             }
             for thing in shot.things
         ],
@@ -222,8 +219,7 @@ def write_truth(folder: Path) -> None:
         "stereo_depth": {
             "file": "stereo_depth.png",
             "unit_m": DEPTH_UNIT_M,
-            "meaning": "depth along z of the left camera at each pixel centre of the distorted "
-            "left picture; 0 = none",
+            "meaning": "depth along z of the left camera at each pixel centre of the distorted left picture; 0 = none",
         },
         "pictures": pictures,
     }

@@ -150,9 +150,7 @@ def resample(source: np.ndarray, pinhole: Pinhole, camera: Camera, sub: int = 4)
         column = xy[..., 0] * pinhole.f_px + pinhole.width / 2 - 0.5
         row = xy[..., 1] * pinhole.f_px + pinhole.height / 2 - 0.5
         for channel in range(3):
-            fine = ndimage.map_coordinates(
-                source[..., channel], [row, column], order=1, mode="nearest"
-            )
+            fine = ndimage.map_coordinates(source[..., channel], [row, column], order=1, mode="nearest")
             fine = fine.reshape(len(rows), sub, camera.width, sub)
             out[rows, :, channel] = fine.mean(axis=(1, 3))
     return out

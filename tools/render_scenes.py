@@ -90,18 +90,12 @@ def desk() -> Shot:
 
 def desk_objects(scene: rs.Scene) -> list[Thing]:
     """The three flat objects of known size."""
-    paper, a4 = rs.flat(
-        (-0.135, 0.035, 0.0001), 0.210, 0.297, 7.0, rs.matte(rs.image(tx.a4_sheet()))
-    )
-    print_, page = rs.flat(
-        (0.085, 0.085, 0.0002), 0.070, 0.070, -11.0, rs.matte(rs.image(tx.marker_print(7)))
-    )
+    paper, a4 = rs.flat((-0.135, 0.035, 0.0001), 0.210, 0.297, 7.0, rs.matte(rs.image(tx.a4_sheet())))
+    print_, page = rs.flat((0.085, 0.085, 0.0002), 0.070, 0.070, -11.0, rs.matte(rs.image(tx.marker_print(7))))
     middle = page.mean(axis=0)
     black = middle + (page - middle) * (50 / 70)
     face = rs.glossy(rs.image(tx.bank_card()), 0.15)
-    body, card = rs.rounded_card(
-        np.array([0.085, -0.055, 0.0]), 14.0, (0.0856, 0.05398), 0.00318, 0.00076, face
-    )
+    body, card = rs.rounded_card(np.array([0.085, -0.055, 0.0]), 14.0, (0.0856, 0.05398), 0.00318, 0.00076, face)
     add_all(scene, (paper, print_, body))
     sheet_size = {"width": 0.210, "height": 0.297}
     return [
@@ -199,9 +193,7 @@ def belt() -> Shot:
     scene.add({"type": "constant", "radiance": rs.colour((0.55, 0.57, 0.60))})
     centre = np.array([0.006, -0.004, 1.1265])
     rotation = rotation_x(0.14) @ rotation_y(-0.11) @ rotation_z(0.20) @ np.diag([1.0, -1, -1])
-    camera = Camera(
-        1600, 1200, 2685.3, 792.6, 604.7, (-0.072, 0.085, -0.0002, 0.0003, 0.0), rotation, centre
-    )
+    camera = Camera(1600, 1200, 2685.3, 792.6, 604.7, (-0.072, 0.085, -0.0002, 0.0003, 0.0), rotation, centre)
     things = [belt_package(x0, x1, y0, y1, z)]
     nominal = Nominal("Belt 12", 12.0, 7.2, 5.4, focal_plane_resolution=True)
     return Shot("belt.jpg", scene, camera, nominal, 1.10, 2, things)
@@ -233,9 +225,7 @@ def street() -> Shot:
     person = add_person(scene, np.array([-1.05, 8.0, 0.0]))
     van = add_van(scene, 0.35, 14.0)
     centre = np.array([-0.15, 0.0, 1.60])
-    target = shifted(
-        centre, np.sin(np.radians(1.0)), np.cos(np.radians(1.0)), -np.tan(np.radians(2.0))
-    )
+    target = shifted(centre, np.sin(np.radians(1.0)), np.cos(np.radians(1.0)), -np.tan(np.radians(2.0)))
     camera = Camera(
         1800, 1200, 1829.4, 906.8, 596.1, (-0.062, 0.031, 0.0003, 0.0002, 0.0),
         look_at(centre, target, -0.3), centre,

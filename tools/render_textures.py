@@ -27,12 +27,8 @@ def noise(shape, cells, seed: int, octaves: int = 4) -> np.ndarray:
             break
         grid = rng.normal(size=(ny, nx))
         grid = np.pad(grid, 3, mode="wrap")
-        rows = ndimage.map_coordinates(
-            grid, np.meshgrid(y * ny + 3, np.arange(nx + 6), indexing="ij"), order=2
-        )
-        full = ndimage.map_coordinates(
-            rows, np.meshgrid(np.arange(shape[0]), x * nx + 3, indexing="ij"), order=2
-        )
+        rows = ndimage.map_coordinates(grid, np.meshgrid(y * ny + 3, np.arange(nx + 6), indexing="ij"), order=2)
+        full = ndimage.map_coordinates(rows, np.meshgrid(np.arange(shape[0]), x * nx + 3, indexing="ij"), order=2)
         total += full * 0.55**octave
     return (total - total.mean()) / total.std()
 
@@ -73,9 +69,7 @@ def font(size: int):
 
 def to_reflectance(image: Image.Image, white: float = 0.82) -> np.ndarray:
     """A drawn sRGB picture as reflectance with the given white."""
-    return (0.02 + (white - 0.02) * decode_srgb(np.asarray(image.convert("RGB")))).astype(
-        np.float32
-    )
+    return (0.02 + (white - 0.02) * decode_srgb(np.asarray(image.convert("RGB")))).astype(np.float32)
 
 
 TEXT = (

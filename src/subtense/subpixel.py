@@ -125,7 +125,10 @@ def fit_side(gray: Array, start: Array, end: Array, inside: Array, half: float) 
     if len(value) < 24:
         return None
     low, high = (float(np.median(value[where])) for where in (n < -half / 3, n > half / 3))
-    if not high - low > 0.05:
+    scatter = max(
+        float(np.median(abs(value[where] - level))) for where, level in ((n < -half / 3, low), (n > half / 3, high))
+    )
+    if not high - low > max(0.05, 2 * scatter):  # no step, or a picture of noise: not worth a fit
         return None
     u = 2 * t / length - 1  # -1 to 1 along the side, for a well-conditioned fit
     begin = np.array([0.0, 0.0, 0.6, low, high, 0.0, 0.0, CURVE, 0.0])

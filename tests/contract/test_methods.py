@@ -23,7 +23,7 @@ def method(request):
 
 
 def test_is_documented(method):
-    assert method.name == [name for name, m in METHODS.items() if m is method][0]
+    assert method.name == next(name for name, m in METHODS.items() if m is method)
     assert method.function.__doc__ and "Source" in method.function.__doc__
     assert method.assumes and method.source and method.typical and method.needs
     for field in dataclasses.fields(method.inputs):

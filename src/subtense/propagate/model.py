@@ -44,6 +44,7 @@ def model_of(method: Method | Function, inputs: Any) -> Model:
 
 
 def method_model(method: Method, inputs: Any) -> Model:
+    """The model of a method, with the nominal solution of these inputs where it needs one."""
     start = (method.start(inputs),) if method.start else ()
     names = tuple(output.name for output in method.outputs)
 

@@ -11,6 +11,8 @@ from ..photo import Photo
 from .rounding import digits_for, fitting_unit, grouped
 
 INK, HALO, PLATE = (255, 221, 51), (20, 20, 20), (20, 20, 20, 190)
+SMOOTHED_PIXELS = 30_000_000
+"""Larger pictures are drawn on directly."""
 FORMATS = (".png", ".jpg", ".jpeg", ".webp")
 
 
@@ -39,22 +41,30 @@ def draw(document: Document, photo: Photo) -> Any:
     from PIL import Image, ImageDraw
 
     picture = Image.fromarray(photo.pixels).convert("RGB")
-    pen = ImageDraw.Draw(picture, "RGBA")
     unit = max(picture.size) / 1600
-    taken: list[tuple[float, float, float, float]] = []
+    smooth = 2 if picture.width * picture.height <= SMOOTHED_PIXELS else 1
+    layer = Image.new("RGBA", (picture.width * smooth, picture.height * smooth), (0, 0, 0, 0))
+    pen = ImageDraw.Draw(layer)
     for shape in document.shapes:
-        _outline(pen, shape, unit)
+        _outline(pen, shape, unit * smooth, smooth)
+    if smooth > 1:
+        layer = layer.resize(picture.size, Image.Resampling.BOX)
+    picture.paste(layer, mask=layer)
+    pen = ImageDraw.Draw(picture, "RGBA")
+    taken: list[tuple[float, float, float, float]] = []
     for shape in document.shapes:
         _plate(pen, _caption(document, shape.label), shape, unit, picture.size, taken)
     return picture
 
 
-def _outline(pen: Any, shape: Shape, unit: float) -> None:
-    points = [*shape.points_px, *(shape.points_px[:1] if shape.closed else ())]
+def _outline(pen: Any, shape: Shape, unit: float, smooth: int) -> None:
+    """Lines and hollow ends on a layer `smooth` times larger, whose pixel centres lie at (x + 0.5) smooth - 0.5."""
+    ends = [((x + 0.5) * smooth - 0.5, (y + 0.5) * smooth - 0.5) for x, y in shape.points_px]
+    points = [*ends, *(ends[:1] if shape.closed else ())]
     for colour, width in ((HALO, 5 * unit), (INK, 2.4 * unit)):
         pen.line(points, fill=colour, width=max(round(width), 1), joint="curve")
     r = 7 * unit
-    for x, y in shape.points_px:  # hollow, so that the end itself stays visible
+    for x, y in ends:  # hollow, so that the end itself stays visible
         for colour, width in ((HALO, 4 * unit), (INK, 2 * unit)):
             pen.ellipse((x - r, y - r, x + r, y + r), outline=colour, width=max(round(width), 1))
 

@@ -1,0 +1,40 @@
+# demo and test need Python 3.11 or later, make and a network; everything goes into .venv.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+OPENCV ?=
+
+.PHONY: demo test check coverage bench docs clean
+
+$(BIN)/subtense: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
+	@touch $@
+
+$(BIN)/pytest: $(BIN)/subtense requirements-dev.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --requirement requirements-dev.txt
+	@touch $@
+
+demo: $(BIN)/subtense            ## measure the example photos, print what was found, write the annotated pictures
+	$(BIN)/python tools/demo.py
+
+test: $(BIN)/pytest              ## the tests
+	$(BIN)/pytest --numprocesses 2 --dist worksteal
+
+check: $(BIN)/pytest             ## formatting, lint and types
+	$(BIN)/ruff format --check src tests tools benchmarks
+	$(BIN)/ruff check src tests tools benchmarks
+	$(BIN)/mypy
+
+coverage: $(BIN)/pytest          ## the long coverage tables, into docs/accuracy.md
+	$(BIN)/python benchmarks/accuracy.py
+
+bench: $(BIN)/pytest             ## speed against named peers, into docs/benchmarks.md
+	$(BIN)/python benchmarks/run.py
+
+docs: $(BIN)/subtense            ## the documentation site, into site/
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --requirement requirements-docs.txt
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+clean:
+	rm -rf $(VENV) site demo-out .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,158 @@
+"""Accuracy against truth, into docs/accuracy.md: simulated coverage, the example pictures, and real pictures.
+
+The real pictures lie outside the repository (../shared/data); without them their part of the page is left as it is.
+"""
+
+import csv
+import json
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "tests" / "synthetic"))
+sys.path.insert(0, str(ROOT / "tests"))
+
+import test_coverage as coverage  # noqa: E402
+import test_real_pictures as real  # noqa: E402
+
+from subtense import Photo, Quantity, measure_lines, measure_markers, resolve_camera  # noqa: E402
+from subtense.methods import known_size, pose  # noqa: E402
+from subtense.observation import Observation  # noqa: E402
+
+PAGE = ROOT / "docs" / "accuracy.md"
+DATA = ROOT.parent / "shared" / "data"
+Row = tuple[str, ...]
+
+
+def percent(x: float, digits: int = 1) -> str:
+    """A share as a percentage."""
+    return f"{100 * x:.{digits}f} %"
+
+
+def simulated() -> list[Row]:
+    """Coverage of the range, share of truths below the interval, u of the range, for 1,000 scenes a geometry."""
+    rows = [("method", "geometry", "intervals that hold the truth", "truth below / above", "typical u")]
+    jobs = [(known_size.METHOD, coverage.known_size_scene, kind) for kind in coverage.GEOMETRY]
+    jobs += [(pose.METHOD, coverage.marker_scene, kind) for kind in ("near", "typical", "tilted")]
+    for method, make, kind in jobs:
+        hit, below, _, width, _ = coverage.score(method, make, kind)
+        above = 1 - hit.mean(axis=0) - below.mean(axis=0)
+        u = percent(float(np.median(width[:, 0])) / 3.92)
+        sides = f"{percent(float(below[:, 0].mean()))} / {percent(float(above[0]))}"
+        rows.append((method.name, kind, percent(float(hit[:, 0].mean())), sides, u))
+        print(rows[-1], flush=True)
+    return rows
+
+
+def examples() -> list[Row]:
+    """The example pictures by their metadata alone."""
+    pictures = {p["file"]: p for p in json.loads((ROOT / "examples" / "truth.json").read_text())["pictures"]}
+    things = (
+        ("desk.jpg", "marker", None, 0.05), ("belt.jpg", "package_top", ("left_edge_middle", "right_edge_middle"), 0.2),
+        ("street.jpg", "person", ("soles", "head_top"), 1.75), ("street.jpg", "car_rear", ("bottom_left", "bottom_right"), 1.8),
+        ("facade.jpg", "door", ("bottom_left", "top_left"), 2.1),
+    )  # fmt: skip
+    rows = [("picture", "what", "true range", "measured", "95 %", "error")]
+    for file, thing, ends, size in things:
+        known = {p["name"]: p for p in next(o for o in pictures[file]["objects"] if o["name"] == thing)["points"]}
+        pair = [known[name] for name in ends] if ends else list(known.values())
+        true = float(np.linalg.norm(np.mean([p["camera_m"] for p in pair], axis=0)))
+        photo, length = Photo.load(ROOT / "examples" / file), Quantity.interval(size, 0.005 * size, "m")
+        if ends:
+            document = measure_lines(photo, [Observation(np.round([p["pixel_px"] for p in pair]))], [length])
+        else:
+            document = measure_markers(photo, length)
+        rows.append((file, thing.replace("_", " "), f"{true:.3f} m", *outcome(document.measurements[0], true)))
+    return rows
+
+
+def outcome(m, true: float) -> Row:
+    """Measured value, interval and relative error."""
+    return f"{m.value:.3f} m", f"{m.low:.3f} to {m.high:.3f} m", percent(m.value / true - 1, 2)
+
+
+def frc_2019() -> list[Row]:
+    """Width of a lit target at 21 to 108 inches, camera from its calibration."""
+    folder = DATA / "known_size" / "frc2019"
+    truth = json.loads((folder / "truth.json").read_text())
+    rows = [("picture", "true depth", "measured", "95 %", "error")]
+    for name, distance in truth["images"].items():
+        photo = Photo.load(folder / name)
+        size = Quantity.interval(truth["known_width_m"], 0.002, "m")
+        document = measure_lines(
+            photo, [Observation(real.ends_of_green(photo), 0.7)], [size], camera=f"f={truth['f_px']} ± 3 px"
+        )
+        depth = next(m for m in document.measurements if m.what == "depth")
+        rows.append((name, f"{distance:.3f} m", *outcome(depth, distance)))
+    return rows
+
+
+def april_vision(tmp: Path) -> list[Row]:
+    """Tags of 0.2 m at 1 and 2 m, synthetic pictures of another project, camera known."""
+    folder = DATA / "fiducial" / "april_vision_synth"
+    camera = {
+        "width_px": 800,
+        "height_px": 800,
+        "f_px": 1293.0912575,
+        "cx_px": 399.5,
+        "cy_px": 399.5,
+        "cov": np.zeros((4, 4)).tolist(),
+    }
+    path = tmp / "camera.json"
+    path.write_text(json.dumps(camera))
+    rows = [("picture", "true range", "measured", "95 %", "error")]
+    places = {int(row["Index"]): row for row in csv.DictReader((folder / "locations.csv").read_text().splitlines())}
+    for picture in sorted(folder.glob("img-*.png")):
+        true = float(places[int(picture.stem[-3:])]["r"])
+        document = measure_markers(Photo.load(picture), Quantity.exact(0.2, "m"), camera=str(path))
+        rows.append((picture.name, f"{true:.4f} m", *outcome(document.measurements[0], true)))
+    return rows
+
+
+def focal_lengths() -> list[Row]:
+    """Focal length from the metadata against a calibration of the same camera."""
+    cases = (
+        ("iPhone 8 Plus", "exif_intrinsics/iphone8plus/IMG_1443.jpg", 3280.1),
+        ("Kodak Z612", "exif_intrinsics/kodak_sceaux/100_7100.JPG", 2905.88),
+        ("DJI FC300S, 16:9", "ground_plane/drone_nadir/DJI_0024.JPG", 2344.0),
+    )  # fmt: skip
+    rows = [("camera", "calibrated f", "from the metadata", "95 %", "error")]
+    for name, file, f_px in cases:
+        camera = resolve_camera(Photo.load(DATA / file)).camera
+        half = 1.96 * camera.u_f_px
+        interval = f"{camera.f_px - half:.0f} to {camera.f_px + half:.0f} px"
+        rows.append((name, f"{f_px:.0f} px", f"{camera.f_px:.0f} px", interval, percent(camera.f_px / f_px - 1)))
+    return rows
+
+
+def table(rows: list[Row]) -> str:
+    """Rows as a Markdown table."""
+    head, *body = ("| " + " | ".join(row) + " |" for row in rows)
+    return "\n".join([head, "|" + " --- |" * len(rows[0]), *body])
+
+
+def put(name: str, rows: list[Row]) -> None:
+    """Write a table between its markers on the page."""
+    text = PAGE.read_text()
+    block = f"<!-- {name} -->\n\n{table(rows)}\n\n<!-- end -->"
+    PAGE.write_text(re.sub(rf"<!-- {name} -->.*?<!-- end -->", lambda _: block, text, flags=re.DOTALL))
+
+
+def main() -> None:
+    """Measure all, and rewrite the page."""
+    import tempfile
+
+    put("examples", examples())
+    if DATA.is_dir():
+        put("frc2019", frc_2019())
+        put("focal", focal_lengths())
+        with tempfile.TemporaryDirectory() as folder:
+            put("april_vision", april_vision(Path(folder)))
+    put("simulated", simulated())
+
+
+if __name__ == "__main__":
+    main()
