@@ -1,4 +1,4 @@
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -92,6 +92,41 @@ def test_rows_give_what_single_scenes_give():
         )
         assert many.value[:, i] == pytest.approx(one.value)
         assert many.u[:, i] == pytest.approx(one.u, rel=1e-3)
+
+
+def test_rows_may_differ_in_their_sigma():
+    points = np.tile(np.array([[700.0, 600], [900, 620]]), (5, 1, 1))
+    sigma = np.linspace(0.1, 0.5, 5)[:, None] * np.ones(2)
+    inputs = known_size.Inputs(CAMERA, Observation(points, sigma), Quantity.normal(0.2, 0.001, "m"))
+    for method in (known_size.METHOD, replace(known_size.METHOD, derivative=None)):
+        found = propagate.rows(method, inputs, chunk=2)
+        for i in range(5):
+            one = propagate.first_order(known_size.METHOD, scene(sigma=float(sigma[i, 0])))
+            assert found.u[:, i] == pytest.approx(one.u, rel=1e-3)
+
+
+def test_one_noun_in_two_fields_stays_one_over_rows():
+    @dataclass(frozen=True)
+    class Pair:
+        a: Quantity
+        b: Quantity
+
+    @dataclass(frozen=True)
+    class Gap:
+        y: np.ndarray
+        reason: np.ndarray
+
+    def gap(pair):
+        y = np.asarray(pair.a.value) - np.asarray(pair.b.value)
+        return Gap(y, np.zeros(y.shape, np.int8))
+
+    method = Method(
+        "gap", "a stub", Pair, (Output("y", "length", "m", "y"),), gap, ("none",), "none", "none", lambda: None
+    )
+    rows = Quantity(np.arange(1.0, 8), 0.1, "m")
+    other = Quantity(np.arange(1.0, 8), 0.1, "m")
+    assert propagate.rows(method, Pair(rows, rows), chunk=3).u == pytest.approx(0)
+    assert propagate.rows(method, Pair(rows, other), chunk=3).u == pytest.approx(0.1 * np.sqrt(2))
 
 
 def test_a_row_without_an_answer_is_nan_with_its_reason():

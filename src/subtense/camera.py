@@ -136,11 +136,15 @@ class Camera(Noun):
         k = self.coefficients
         return [k[..., i, None] if k.ndim > 1 else k[..., i] for i in range(k.shape[-1])]
 
+    def _plane(self, points_px: Array) -> tuple[Array, Array]:
+        """(..., N) normalised image coordinates, still distorted."""
+        f, aspect, cx, cy = (
+            v if isinstance(v := getattr(self, n), float) else np.asarray(v)[..., None] for n in _INTRINSICS
+        )
+        return (points_px[..., 0] - cx) * (1 / f), (points_px[..., 1] - cy) * (1 / (f * aspect))
+
     def _directions(self, points_px: Array) -> tuple[Array, Array, Array]:
-        f, aspect, cx, cy = (np.asarray(getattr(self, n))[..., None] for n in _INTRINSICS)
-        x = (points_px[..., 0] - cx) / f
-        y = (points_px[..., 1] - cy) / (f * aspect)
-        return LENSES[self.lens].to_ray(x, y, self._coefficient_list())
+        return LENSES[self.lens].to_ray(*self._plane(points_px), self._coefficient_list())
 
     def rays(self, points_px: Array) -> Array:
         """Unit viewing directions of pixels.
@@ -156,8 +160,10 @@ class Camera(Noun):
 
     def slopes(self, points_px: Array) -> tuple[Array, Array]:
         """(..., N) x/z and y/z of viewing directions: where they pierce the plane at depth 1; NaN if they don't."""
+        if self.lens == "pinhole":
+            return self._plane(points_px)
         x, y, z = self._directions(points_px)
-        if self.lens in ("pinhole", "brown_conrady"):
+        if self.lens == "brown_conrady":
             return x, y
         with np.errstate(divide="ignore", invalid="ignore"):
             z = np.where(z > 0, z, np.nan)

@@ -79,8 +79,7 @@ def segment_depth(ax: Array, ay: Array, bx: Array, by: Array, length: Array, til
     a2 = ax * ax + ay * ay
     with np.errstate(divide="ignore", invalid="ignore"):
         if not np.any(tilt_rad):
-            depth = length / np.sqrt(a2)
-            return depth, np.zeros_like(depth)
+            return length / np.sqrt(a2), np.zeros(())
         step = length * np.sin(tilt_rad)
         across = length * np.cos(tilt_rad)
         ab = step * (ax * bx + ay * by)

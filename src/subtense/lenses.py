@@ -55,7 +55,7 @@ def _pinhole_to_plane(x: Array, y: Array, z: Array, _: Coefficients) -> Pair:
 
 
 def _pinhole_to_ray(x: Array, y: Array, _: Coefficients) -> Triple:
-    return x, y, np.ones_like(x)
+    return x, y, np.broadcast_to(1.0, x.shape)
 
 
 # -- Brown-Conrady, as OpenCV has it: k1 k2 p1 p2 k3 | k4 k5 k6 | s1 s2 s3 s4 | tau_x tau_y ---------------

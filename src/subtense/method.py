@@ -48,6 +48,7 @@ _REASONS: dict[Reason, tuple[str, bool]] = {
     Reason.OUT_OF_RANGE: ("an input left the range it has a meaning in (a length, a focal length of 0 or below)", True),
 }
 
+Partials = tuple[Array, ...]
 Reasons = npt.NDArray[np.int8]
 
 
@@ -88,7 +89,8 @@ class Method:
         example: makes Inputs for documentation and contract tests.
         prepare: settles what the inputs leave open (the weight of a second solution) before anything is moved.
         start: for estimators, the nominal solution that `function` refines (its second argument).
-        derivative: partial derivatives by (field, part key): {output: {(field, key): (k, ...)}}; None where it has none.
+        derivative: partial derivatives by (field, part key): {output: {(field, key): one array a
+            component}}; None where it has none.
         notes: doubts that follow from the inputs and the nominal result.
         most_draws: where the adaptive procedure stops at the latest.
         vectorised: False for engines that take one scene at a time.
@@ -105,7 +107,7 @@ class Method:
     example: Callable[[], Any]
     prepare: Callable[[Any], Any] = field(default=lambda inputs: inputs)
     start: Callable[[Any], Any] | None = None
-    derivative: Callable[[Any, Any], Mapping[str, Mapping[tuple[str, str], Array]] | None] | None = None
+    derivative: Callable[[Any, Any], Mapping[str, Mapping[tuple[str, str], Partials]] | None] | None = None
     notes: Callable[[Any, Any], tuple[Note, ...]] = field(default=lambda inputs, result: ())
     vectorised: bool = True
     most_draws: int = 1_000_000

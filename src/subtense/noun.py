@@ -8,7 +8,6 @@ and takes moved values back through `moved()`; nothing else in the package knows
 from __future__ import annotations
 
 import abc
-import copy
 import dataclasses
 import json
 from collections.abc import Hashable, Mapping
@@ -101,15 +100,17 @@ class Noun(abc.ABC):
         for name, axes in self.core.items():
             value = getattr(self, name)
             if value is not None and np.ndim(value) > axes and np.shape(value)[0] > 1:
-                changes[name] = value[where]
+                # rows innermost in memory: what a method does with a column then runs along it
+                columns = np.ascontiguousarray(np.moveaxis(value[where], 0, -1))
+                changes[name] = np.moveaxis(columns, -1, 0)
         return self._with(**changes) if changes else self
 
     def _with(self, **changes: Any) -> Self:
         """A copy with fields replaced and the constructor's checks left out (draws may leave the allowed range)."""
-        new = copy.copy(self)
+        new = object.__new__(type(self))
+        new.__dict__.update(self.__dict__)
         new.__dict__.pop("digest", None)
-        for name, value in changes.items():
-            object.__setattr__(new, name, value)
+        new.__dict__.update(changes)
         return new
 
 

@@ -41,7 +41,7 @@ class Observation(Noun):
     id: str | None = None
 
     widget: ClassVar[str] = "points"
-    core: ClassVar[Mapping[str, int]] = {"points_px": 2}
+    core: ClassVar[Mapping[str, int]] = {"points_px": 2, "sigma_px": 1}
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points_px, float)
@@ -82,7 +82,7 @@ class Observation(Noun):
         sigma = np.asarray(self.sigma_px, float)
         if sigma.ndim == 0:
             return np.full(2 * self.points_px.shape[-2], float(sigma))
-        return np.repeat(sigma, 2, axis=-1)
+        return np.moveaxis(np.repeat(np.moveaxis(sigma, -1, 0), 2, axis=0), 0, -1)
 
     def parts(self) -> tuple[Part, ...]:
         flat = self.points_px.reshape(*self.points_px.shape[:-2], -1)

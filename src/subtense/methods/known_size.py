@@ -9,7 +9,7 @@ that holds for focus at infinity makes the depth too short by about f (thin lens
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from ..lenses import LENSES
 from ..method import Method, Output, Reason, Reasons, reasons
 from ..observation import Observation
 from ..quantity import Note, Quantity
+
+NO_EXTENSION = Quantity.exact(0.0, "1", "the camera is calibrated")
 
 
 @dataclass(frozen=True)
@@ -59,15 +61,15 @@ def known_size(inputs: Inputs) -> Result:
     """
     x, y = inputs.camera.slopes(inputs.ends.points_px)
     ax, ay = x[..., 1] - x[..., 0], y[..., 1] - y[..., 0]
-    bx, by = (x[..., 0] + x[..., 1]) / 2, (y[..., 0] + y[..., 1]) / 2
-    size = np.asarray(inputs.size.value)
+    bx, by = (x[..., 0] + x[..., 1]) * 0.5, (y[..., 0] + y[..., 1]) * 0.5
+    size, nominal_m = np.asarray(inputs.size.value), inputs.camera.nominal_focal_m
     depth, half_step = segment_depth(ax, ay, bx, by, size, np.asarray(inputs.tilt.value))
-    extension = np.asarray(inputs.focus.value) * (inputs.camera.nominal_focal_m or 0.0)
-    depth_m = depth + extension if inputs.camera.nominal_focal_m else depth
-    # the middle of the 3-D segment: Z b + (half step) a / 2, at depth Z
-    shift = half_step / (2 * depth) if np.any(half_step) else 0.0
-    range_m = depth_m * np.sqrt(1 + (bx + shift * ax) ** 2 + (by + shift * ay) ** 2)
-    if np.all(depth_m > 0) and np.all(np.isfinite(range_m)) and LENSES[inputs.camera.lens].perspective:
+    depth_m = depth + np.asarray(inputs.focus.value) * nominal_m if nominal_m else depth
+    if np.any(half_step):  # the middle of the 3-D segment: Z b + (half step) a / 2, at depth Z
+        shift = half_step / (2 * depth)
+        bx, by = bx + shift * ax, by + shift * ay
+    range_m = depth_m * np.sqrt(1 + bx * bx + by * by)
+    if LENSES[inputs.camera.lens].perspective and depth_m.min(initial=np.inf) > 0 and range_m.max(initial=0.0) < np.inf:
         return Result(range_m, depth_m, np.zeros(range_m.shape, np.int8))  # nothing went wrong: the usual case
     perspective = np.asarray(not LENSES[inputs.camera.lens].perspective)
     code = reasons(
@@ -78,7 +80,7 @@ def known_size(inputs: Inputs) -> Result:
     return Result(range_m, depth_m, code)
 
 
-def derivative(inputs: Inputs, result: Result) -> dict[str, dict[tuple[str, str], Array]] | None:
+def derivative(inputs: Inputs, result: Result) -> dict[str, dict[tuple[str, str], tuple[Array, ...]]] | None:
     """Partial derivatives for a pinhole and an object that faces it; None otherwise.
 
     With the pixel difference (dx, dy), e = hypot(dx, dy / aspect) and the middle's slopes b:
@@ -87,36 +89,42 @@ def derivative(inputs: Inputs, result: Result) -> dict[str, dict[tuple[str, str]
     camera = inputs.camera
     if camera.lens != "pinhole" or np.any(inputs.tilt.value) or np.any(inputs.tilt.u):
         return None
-    f, aspect = np.asarray(camera.f_px), np.asarray(camera.aspect)
+    per_f, per_aspect = 1 / np.asarray(camera.f_px), 1 / np.asarray(camera.aspect)
+    nominal_m, zero = camera.nominal_focal_m or 0.0, np.zeros(())
     x, y = inputs.ends.points_px[..., 0], inputs.ends.points_px[..., 1]
-    dx, dy = x[..., 1] - x[..., 0], (y[..., 1] - y[..., 0]) / aspect
-    bx = ((x[..., 0] + x[..., 1]) / 2 - camera.cx_px) / f
-    by = ((y[..., 0] + y[..., 1]) / 2 - camera.cy_px) / (f * aspect)
-    depth, slant = np.where(result.reason == 0, result.depth_m, np.nan), np.hypot(1, np.hypot(bx, by))
-    classical = depth - np.asarray(inputs.focus.value) * (camera.nominal_focal_m or 0.0)
-    length2 = np.where(result.reason == 0, dx * dx + dy * dy, np.nan)
-    per_e2 = -classical / length2
-    ends = np.stack([-per_e2 * dx, -per_e2 * dy / aspect, per_e2 * dx, per_e2 * dy / aspect])
-    turn_x, turn_y = depth * bx / (slant * f), depth * by / (slant * f * aspect)
-    half = np.stack([turn_x, turn_y, turn_x, turn_y]) / 2
-    along = {
-        "f": classical / f, "aspect": classical * dy * dy / length2 / aspect,
-        "size": classical / np.asarray(inputs.size.value), "focus": np.full_like(depth, camera.nominal_focal_m or 0.0),
-    }  # fmt: skip
-    b2 = bx * bx + by * by
+    dx, dy = x[..., 1] - x[..., 0], (y[..., 1] - y[..., 0]) * per_aspect
+    bx = (x[..., 0] + x[..., 1] - 2 * camera.cx_px) * (0.5 * per_f)
+    by = (y[..., 0] + y[..., 1] - 2 * camera.cy_px) * (0.5 * per_f * per_aspect)
+    slant = np.sqrt(1 + bx * bx + by * by)
+    depth = np.where(result.reason == 0, result.depth_m, np.nan) if result.reason.any() else result.depth_m
+    classical = depth - np.asarray(inputs.focus.value) * nominal_m if nominal_m else depth
+    with np.errstate(divide="ignore", invalid="ignore"):
+        per_length2 = classical / (dx * dx + dy * dy)
+    gx, gy, over = per_length2 * dx, per_length2 * dy * per_aspect, depth / slant
+    tx, ty = over * bx * (0.5 * per_f), over * by * (0.5 * per_f * per_aspect)
+    by_f, by_size, by_aspect = (
+        classical * per_f,
+        classical / np.asarray(inputs.size.value),
+        per_length2 * dy * dy * per_aspect,
+    )
+    gx_slant, gy_slant = gx * slant, gy * slant
     return {
         "depth_m": {
-            ("camera", "0"): along["f"][None], ("camera", "1"): along["aspect"][None],
-            ("camera", "2,3"): np.zeros((2, *depth.shape)), ("ends", "points"): ends,
-            ("size", "value"): along["size"][None], ("focus", "value"): along["focus"][None],
+            ("camera", "0"): (by_f,), ("camera", "1"): (by_aspect,), ("camera", "2,3"): (zero, zero),
+            ("ends", "points"): (gx, gy, -gx, -gy), ("size", "value"): (by_size,), ("focus", "value"): (zero + nominal_m,),
         },
         "range_m": {
-            ("camera", "0"): (along["f"] * slant - depth * b2 / (slant * f))[None],
-            ("camera", "1"): (along["aspect"] * slant - depth * by * by / (slant * aspect))[None],
-            ("camera", "2,3"): -np.stack([turn_x, turn_y]), ("ends", "points"): ends * slant + half,
-            ("size", "value"): (along["size"] * slant)[None], ("focus", "value"): (along["focus"] * slant)[None],
+            ("camera", "0"): (by_f * slant - over * (bx * bx + by * by) * per_f,),
+            ("camera", "1"): (by_aspect * slant - over * by * by * per_aspect,), ("camera", "2,3"): (-2 * tx, -2 * ty),
+            ("ends", "points"): (gx_slant + tx, gy_slant + ty, tx - gx_slant, ty - gy_slant),
+            ("size", "value"): (by_size * slant,), ("focus", "value"): (slant * nominal_m,),
         },
     }  # fmt: skip
+
+
+def prepare(inputs: Inputs) -> Inputs:
+    """A calibrated focal length holds its focus extension already: nothing is doubtful about it."""
+    return inputs if inputs.camera.nominal_focal_m else replace(inputs, focus=NO_EXTENSION)
 
 
 def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
@@ -155,5 +163,6 @@ METHOD = Method(
     typical="1 to 3 % with a nominal focal length, 0.2 to 1 % calibrated",
     example=example,
     derivative=derivative,
+    prepare=prepare,
     notes=notes,
 )  # fmt: skip

@@ -164,7 +164,7 @@ def _own_curvature(lines: Sequence[Line], hessian: Array) -> Array:
 def effective_dof(u: Array, contributions: Array, dof: Array) -> Array:
     """Welch-Satterthwaite (GUM G.4.1), per output."""
     if not np.any(np.isfinite(dof)):
-        return np.full(u.shape, np.inf)
+        return np.broadcast_to(np.inf, u.shape)
     finite = np.isfinite(dof).reshape(-1, *(1,) * u.ndim)
     with np.errstate(divide="ignore", invalid="ignore"):
         weight = np.sum(np.where(finite, contributions**4 / dof.reshape(finite.shape), 0.0), axis=0)
@@ -229,34 +229,64 @@ def _cornish_fisher(z: float, skew: float, excess: float) -> float:
 
 
 def rows_by_differences(model: Model, space: Space, level: float) -> Propagated:
-    """Many rows: each line moved on its own, so that what does not move is computed once."""
+    """Many rows: each variable moved on its own, so that what does not move is computed once.
+
+    The bend is that of each variable's own second difference and kurtosis; mixed differences are left out.
+    """
     y0, reason = model.call(space.inputs)
-    lead = y0.shape[1:]
-    variance, shift, kurtosis = np.zeros_like(y0), np.zeros_like(y0), np.zeros_like(y0)
+    variance, shift, fourth = np.zeros_like(y0), np.zeros_like(y0), np.zeros(())
     contributions = np.zeros((len(space.lines), *y0.shape))
-    for row, line in enumerate(space.lines):
-        squared = np.zeros_like(y0)
-        signed = np.zeros_like(y0)
+    for effect, line in zip(contributions, space.lines, strict=True):
         for j, law in enumerate(line.laws):
-            up, down = (_moved_line(model, space, line, sign * line.shift(j), lead) for sign in (1.0, -1.0))
-            signed = (up - down) / 2
-            squared += signed**2
-            shift += (up + down) / 2 - y0 + signed * law.mean
-            kurtosis += signed**4 * (0.0 if law.name == "t" else law.excess_kurtosis)
-        contributions[row] = signed if line.count == 1 else np.sqrt(squared)
-        variance += squared
+            up, down = (_moved_line(model, space, line, sign * line.shift(j), y0.shape) for sign in (1.0, -1.0))
+            shift += up
+            shift += down
+            shift -= 2 * y0
+            up -= down  # twice the contribution
+            if law.mean:
+                shift += law.mean * up
+            if law.excess_kurtosis and law.name != "t":
+                fourth = fourth + np.square(np.square(up)) * (law.excess_kurtosis / 16)
+            if line.count == 1:
+                np.multiply(up, 0.5, out=effect)
+            up *= up
+            variance += up
+            if line.count > 1:
+                effect += up
+        if line.count > 1:
+            effect *= 0.25
+            np.sqrt(effect, out=effect)
+    variance *= 0.25
+    shift *= 0.5
+    return _rows(model, space, y0, reason, contributions, variance, shift, fourth, level)
+
+
+def _rows(
+    model: Model, space: Space, y0: Array, reason: npt.NDArray[np.int8], contributions: Array, variance: Array,
+    shift: Array, fourth: Array, level: float,
+) -> Propagated:  # fmt: skip
+    """Rows from their variance, mean shift and fourth cumulant."""
     u = np.sqrt(variance)
     dof = effective_dof(u, contributions, np.array([line.dof for line in space.lines]))
     z = normal_quantile(0.5 + level / 2)
     k = np.vectorize(lambda d: _coverage_factor(level, d))(dof) if np.any(np.isfinite(dof)) else np.float64(z)
+    still = (u == 0) & (shift == 0) if np.min(u, initial=1.0) == 0 else None
     with np.errstate(divide="ignore", invalid="ignore"):
-        bend = abs(shift) / u * (1 + (z * z - 1)) + abs(kurtosis) / variance**2 * abs(z**3 - 3 * z) / 24
-    bend = np.where((u == 0) & (shift == 0), 0.0, bend)
-    return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, y0 - k * u, y0 + k * u, dof,
+        bend = np.abs(shift, out=shift)
+        bend /= u
+        bend *= z * z
+        if fourth.ndim:
+            bend += abs(fourth) / variance**2 * (abs(z**3 - 3 * z) / 24)
+    if still is not None:
+        bend[still] = 0.0
+    half = k * u
+    return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, y0 - half, y0 + half, dof,
                       contributions, None, None, bend, reason)  # fmt: skip
 
 
-def _moved_line(model: Model, space: Space, line: Line, change: Array, lead: tuple[int, ...]) -> Array:
+def _moved_line(model: Model, space: Space, line: Line, change: Array, shape: tuple[int, ...]) -> Array:
+    """Outputs with one variable of a line moved, writable and of the rows' shape."""
     moved: Moved = {}
     line.put(line.value + change, moved)
-    return np.broadcast_to(model.call(space.rebuilt(moved))[0], (len(model.names), *lead))
+    values, _ = model.call(space.rebuilt(moved))
+    return values if values.shape == shape else np.broadcast_to(values, shape).copy()

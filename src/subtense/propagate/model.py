@@ -51,8 +51,14 @@ def method_model(method: Method, inputs: Any) -> Model:
     def call(moved: tuple[Any, ...]) -> tuple[Array, npt.NDArray[np.int8]]:
         result = method.function(moved[0], *start)
         reason = np.asarray(result.reason)
-        values = [np.broadcast_to(np.asarray(getattr(result, n), float), reason.shape) for n in names]
-        return np.where(reason == 0, np.stack(values), np.nan), reason
+        values = np.empty((len(names), *reason.shape))
+        for row, name in zip(values, names, strict=True) if reason.shape else ():
+            row[...] = getattr(result, name)
+        if not reason.shape:
+            values[...] = [float(getattr(result, name)) for name in names]
+        if reason.any():
+            values[:, reason != 0] = np.nan
+        return values, reason
 
     return Model(names, call, method.most_draws)
 

@@ -59,7 +59,8 @@ def _group(group: list[Measurement]) -> Iterator[str]:
     title = f"{head.label}: " if head.label else ""
     yield f"{title}{TITLES.get(head.what, head.what)}  {headline(head)}"
     how = "" if head.evaluation == "first order" else f"   ({head.evaluation})"
-    yield f"  unrounded {_unrounded(head)}{how}"
+    if head.unit == "m":
+        yield f"  unrounded {_unrounded(head)}{how}"
     for other in others:
         yield f"  {TITLES.get(other.what, other.what):<42}{headline(other)}"
     if head.budget:

@@ -18,7 +18,7 @@ from ..method import Method
 from ..methods import known_size, pose
 from ..observation import Observation
 from ..photo import Photo
-from ..quantity import Contribution, Measurement, Quantity
+from ..quantity import Measurement, Quantity
 from ..target import Target
 from .given import given, inputs_from_json, inputs_from_text, read_json
 from .improve import improved
@@ -131,10 +131,7 @@ def camera_document(photo: Photo, given_camera: str | None = None, *, level: flo
     camera = resolved.camera
     half = normal_quantile(0.5 + level / 2) * camera.u_f_px
     f = float(camera.f_px)
-    budget = (Contribution("focal length", camera.source, camera.u_f_px, 1.0),) if half else ()
-    m = Measurement(
-        "focal_length_px", f, camera.u_f_px, f - half, f + half, "px", resolved.chosen.source, level, budget=budget
-    )
+    m = Measurement("focal_length_px", f, camera.u_f_px, f - half, f + half, "px", resolved.chosen.source, level)
     return _document(photo, resolved, [m], [])
 
 
