@@ -31,8 +31,7 @@ class Propagated:
         lines: names of the budget lines.
         value: (o, ...) nominal values; NaN where there is no answer.
         u: (o, ...) standard deviations.
-        low: (o, ...) lower interval limits.
-        high: (o, ...) upper interval limits.
+        coverage: (o, ...) coverage factor: the interval is value -+ coverage * u.
         dof: (o, ...) effective degrees of freedom (Welch-Satterthwaite).
         contributions: (l, o, ...) signed sensitivity times u, or the root of the summed squares of a block.
         cov: (o, o) covariance of the outputs; None for rows.
@@ -47,8 +46,7 @@ class Propagated:
     lines: tuple[str, ...]
     value: Array
     u: Array
-    low: Array
-    high: Array
+    coverage: Array
     dof: Array
     contributions: Array
     cov: Array | None
@@ -57,6 +55,16 @@ class Propagated:
     reason: npt.NDArray[np.int8]
     quadratic: tuple[_Bent, ...] = ()
     curvature: Array | None = None
+
+    @property
+    def low(self) -> Array:
+        """(o, ...) lower interval limits."""
+        return np.asarray(self.value - self.coverage * self.u)
+
+    @property
+    def high(self) -> Array:
+        """(o, ...) upper interval limits."""
+        return np.asarray(self.value + self.coverage * self.u)
 
 
 def first_order(
@@ -94,7 +102,7 @@ def scene(model: Model, space: Space, level: float) -> Propagated:
     dof = effective_dof(u, contributions, np.array([line.dof for line in space.lines]))
     k = np.array([_coverage_factor(level, float(d)) for d in dof])
     bent = [_quadratic(s[o], hessian[o], space.lines, level) for o in range(len(u))]
-    return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, y0 - k * u, y0 + k * u, dof,
+    return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, k, dof,
                       contributions, s @ s.T, u2, np.array([b.bend for b in bent]), np.asarray(reason[0]),
                       tuple(bent), _own_curvature(space.lines, hessian))  # fmt: skip
 
@@ -237,8 +245,10 @@ def rows_by_differences(model: Model, space: Space, level: float) -> Propagated:
     variance, shift, fourth = np.zeros_like(y0), np.zeros_like(y0), np.zeros(())
     contributions = np.zeros((len(space.lines), *y0.shape))
     for effect, line in zip(contributions, space.lines, strict=True):
+        own = () if line.u is None else line.u.shape
+        numbers = np.array(np.broadcast_to(line.value, np.broadcast_shapes(line.value.shape, own)))  # room to move in
         for j, law in enumerate(line.laws):
-            up, down = (_moved_line(model, space, line, sign * line.shift(j), y0.shape) for sign in (1.0, -1.0))
+            up, down = (_moved_line(model, space, line, j, sign, numbers, y0.shape) for sign in (1.0, -1.0))
             shift += up
             shift += down
             shift -= 2 * y0
@@ -279,14 +289,22 @@ def _rows(
             bend += abs(fourth) / variance**2 * (abs(z**3 - 3 * z) / 24)
     if still is not None:
         bend[still] = 0.0
-    half = k * u
-    return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, y0 - half, y0 + half, dof,
+    return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, np.broadcast_to(k, u.shape), dof,
                       contributions, None, None, bend, reason)  # fmt: skip
 
 
-def _moved_line(model: Model, space: Space, line: Line, change: Array, shape: tuple[int, ...]) -> Array:
-    """Outputs with one variable of a line moved, writable and of the rows' shape."""
+def _moved_line(
+    model: Model, space: Space, line: Line, j: int, sign: float, numbers: Array, shape: tuple[int, ...]
+) -> Array:
+    """Outputs with variable j of a line moved, writable and of the rows' shape; `numbers` is left as it was."""
+    if line.u is None:
+        moved_numbers = numbers + sign * line.shift(j)
+    else:
+        moved_numbers = numbers
+        numbers[j] += sign * line.u[j]
     moved: Moved = {}
-    line.put(line.value + change, moved)
+    line.put(moved_numbers, moved)
     values, _ = model.call(space.rebuilt(moved))
+    if line.u is not None:
+        numbers[j] = line.value[j]
     return values if values.shape == shape else np.broadcast_to(values, shape).copy()

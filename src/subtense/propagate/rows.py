@@ -48,7 +48,7 @@ def rows(
     return Propagated(first.names, first.lines, **whole, cov=None, u_second_order=None)
 
 
-_ARRAYS = ("value", "u", "low", "high", "dof", "contributions", "bend", "reason")
+_ARRAYS = ("value", "u", "coverage", "dof", "contributions", "bend", "reason")
 
 
 def _room(part: Any, n: int) -> Any:
@@ -96,9 +96,8 @@ def _rows_by_derivative(
         for o, name in enumerate(names):
             _add_effect(line, partials[name][fields[identity], key], contributions[row, o], variance[o])
     u = np.sqrt(variance, out=variance)
-    half = normal_quantile(0.5 + level / 2) * u
-    dof, bend = (np.broadcast_to(x, value.shape) for x in (np.inf, np.nan))
-    return Propagated(names, tuple(line.name for line in space.lines), value, u, value - half, value + half, dof,
+    k, dof, bend = (np.broadcast_to(x, value.shape) for x in (normal_quantile(0.5 + level / 2), np.inf, np.nan))
+    return Propagated(names, tuple(line.name for line in space.lines), value, u, k, dof,
                       contributions, None, None, bend, reason)  # fmt: skip
 
 
