@@ -173,3 +173,9 @@ def test_two_unknowns_are_refused():
 def test_an_impossible_tilt_has_no_answer():
     with pytest.raises(GeometryError):
         typed(**{**BELT, "focal": 8, "tilt": "89 exact", "offset": "2000,0", "size": "200"})
+
+
+def test_the_interval_is_never_without_the_value():
+    for distance in (0.06, 0.1, 1.0):
+        near = close_up(distance)
+        assert near.low <= near.value <= near.high

@@ -119,3 +119,13 @@ def test_a_panorama_is_refused():
     inputs = pose.Inputs(camera, Observation(np.array([[1400, 700], [1500, 700], [1500, 800], [1400, 800.0]])), MARKER)
     with pytest.raises(GeometryError, match="panorama"):
         propagate.measure(pose.METHOD, inputs)
+
+
+@pytest.mark.opencv
+@given(st.permutations(range(4)))
+def test_the_order_of_the_points_does_not_matter(order):
+    inputs = seen((0.2, 0.6, 0.1), (0.05, -0.03, 0.6))
+    target = Target("marker", MARKER.points_m[order])
+    other = pose.Inputs(CAMERA, Observation(inputs.points.points_px[order], 0.1), target)
+    first, again = (propagate.measure(pose.METHOD, i)[0] for i in (inputs, other))
+    assert (again.value, again.u) == pytest.approx((first.value, first.u), rel=1e-6)

@@ -111,3 +111,12 @@ def test_aruco_markers_of_the_tutorials_are_found(shared_data):
 
     found = markers(Photo.load(shared_data / "fiducial" / "opencv_aruco" / "singlemarkersoriginal.jpg"))
     assert {o.label for o in found} == {f"6x6 id {n}" for n in (23, 40, 62, 98, 124, 203)}
+
+
+def test_two_markers_of_one_number_are_told_apart(shared_data):
+    from subtense import measure_markers
+
+    picture = shared_data / "fiducial" / "nasa_corners" / "33369213973_9d9bb4cc96_c.jpg"
+    document = measure_markers(Photo.load(picture), Quantity.interval(0.1651, 0.0005, "m"), camera="fov=60 ± 5 deg")
+    labels = [m.label for m in document.measurements if m.what == "range"]
+    assert len(labels) == len(set(labels)) >= 2

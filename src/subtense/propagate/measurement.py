@@ -172,8 +172,11 @@ def _measurement(
 
     curvature = nominal.curvature[:, o] if nominal.curvature is not None and answer.evaluation != "first order" else 0.0
     budget = _budget(space.lines, nominal.contributions[:, o], curvature, answer.u)
+    value = float(nominal.value[o])
+    # a one-sided doubt puts the value at an end of what is possible; the interval is never without it
+    low, high = min(answer.low, value), max(answer.high, value)
     return Measurement(
-        output.what, float(nominal.value[o]), answer.u, limit(answer.low), limit(answer.high), output.unit,
+        output.what, value, answer.u, limit(low), limit(high), output.unit,
         method.name, level, label, answer.evaluation, budget, notes + answer.notes, given=given,
     )  # fmt: skip
 

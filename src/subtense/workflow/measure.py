@@ -89,7 +89,7 @@ def measure_markers(
     if family is not None and family not in FAMILIES:
         raise InputError("--marker-family", family, f"known are {', '.join(FAMILIES)}")
     resolved = resolve_camera(photo, camera)
-    seen = markers(photo, family)
+    seen = _told_apart(markers(photo, family))
     if not seen:
         raise NothingFoundError(f"{photo.path.name}: no marker found, one is needed; it must be sharp, whole, with a light border, "
                                 "and at least 15 px wide")  # fmt: skip
@@ -143,6 +143,17 @@ def _measured(method: Method, inputs: object, label: str, level: float, seed: in
 
 def _document(photo: Photo, resolved: Resolved, found: Sequence[Measurement], shapes: Sequence[Shape]) -> Document:
     return Document(improved(tuple(found)), resolved.to_json(), photo.to_json(), resolved.notes, tuple(shapes))
+
+
+def _told_apart(seen: Sequence[Observation]) -> list[Observation]:
+    """Observations with labels of their own: a second marker of one number gets "(2)"."""
+    counts: dict[str, int] = {}
+    found = []
+    for one in seen:
+        counts[one.label] = counts.get(one.label, 0) + 1
+        again = counts[one.label] > 1
+        found.append(dataclasses.replace(one, label=f"{one.label} ({counts[one.label]})") if again else one)
+    return found
 
 
 def _pairs(observation: Observation) -> tuple[tuple[float, float], ...]:
