@@ -40,7 +40,7 @@ def scene(rows: int) -> Inputs:
     camera = Camera(4000, 3000, 3000.0, 1999.5, 1499.5, cov=np.diag([15.0**2, 0.0, 8.0**2, 6.0**2]))
     first = rng.uniform((200.0, 200.0), (2000.0, 2800.0), (rows, 2))
     step = rng.uniform((100.0, -100.0), (1500.0, 100.0), (rows, 2))
-    ends = Observation(np.stack([first, first + step], axis=1), rng.uniform(0.3, 1.0, (rows, 2)), id="ends")
+    ends = Observation(np.stack([first, first + step], axis=1), rng.uniform(0.3, 1.0, (rows, 2)))
     size = rng.uniform(0.2, 2.0, rows)
     return Inputs(camera, ends, Quantity(size, 0.01 * size, "m", source="stated"))
 

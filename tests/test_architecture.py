@@ -8,7 +8,7 @@ import pytest
 SOURCE = Path(__file__).parent.parent / "src" / "subtense"
 WAYS = {"camera_sources", "detectors", "methods", "reports"}
 FACES = {"cli", "web", "batch"}
-BASE = {"errors", "distribution", "quantity", "noun", "space", "propagate", "geometry", "method"}
+BASE = {"errors", "arrays", "distribution", "quantity", "noun", "space", "propagate", "geometry", "method"}
 HEAVY = {"cv2", "scipy", "PIL", "tomllib"}
 ALLOWED = {"numpy", "click", *HEAVY}
 

@@ -4,8 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from subtense import assumptions
+from subtense.distribution import HALF_WIDTH_95
 from subtense.errors import InputError
-from subtense.quantity import HALF_WIDTH_95, UNITS, Quantity
+from subtense.quantity import UNITS, Quantity
 
 
 @pytest.mark.parametrize(

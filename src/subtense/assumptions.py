@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 
-from .observation import CLICK_SIGMA_PX
 from .quantity import Quantity
 
+CLICK_SIGMA_PX = 0.7
+"""Standard deviation of a clicked end, per coordinate, where nothing was said."""
 NOMINAL_FOCAL = 0.015
 """Relative u of a focal length as engraved or written into a picture: makers round, and it holds at infinity."""
 REAL_SIZE = 0.005

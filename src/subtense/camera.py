@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
-import numpy.typing as npt
 
-from .distribution import Array
+from .arrays import Array, Bools
 from .errors import InputError
 from .lenses import LENSES
 from .noun import Noun, Part, plain
@@ -183,7 +182,7 @@ class Camera(Noun):
         f, aspect, cx, cy = (np.asarray(getattr(self, n))[..., None] for n in _INTRINSICS)
         return np.stack([f * x + cx, f * aspect * y + cy], -1)
 
-    def invertible(self, points_px: Array) -> npt.NDArray[np.bool_]:
+    def invertible(self, points_px: Array) -> Bools:
         """(..., N) whether the lens model gives a direction for these pixels."""
         return np.isfinite(self._directions(np.asarray(points_px, float))[0])
 

@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from .arrays import Array
+
 Coefficients = Sequence[Array]
 Pair = tuple[Array, Array]
 Triple = tuple[Array, Array, Array]

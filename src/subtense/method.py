@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from .distribution import Array
+from .arrays import Array, Bools, Codes
 from .quantity import Note
 
 
@@ -49,7 +48,6 @@ _REASONS: dict[Reason, tuple[str, bool]] = {
 }
 
 Partials = tuple[Array, ...]
-Reasons = npt.NDArray[np.int8]
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ class Method:
         return (self.inputs.__doc__ or "").strip().split("\n\n")[0]
 
 
-def reasons(shape: tuple[int, ...], *conditions: tuple[npt.NDArray[np.bool_], Reason]) -> Reasons:
+def reasons(shape: tuple[int, ...], *conditions: tuple[Bools, Reason]) -> Codes:
     """(shape) the first reason whose condition holds, OK elsewhere."""
     code = np.zeros(shape, np.int8)
     for where, reason in reversed(conditions):

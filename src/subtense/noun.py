@@ -15,11 +15,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-import numpy.typing as npt
 
+from .arrays import Array
 from .distribution import Distribution
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

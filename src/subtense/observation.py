@@ -9,13 +9,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from .distribution import Array
+from .arrays import Array
+from .assumptions import CLICK_SIGMA_PX
 from .errors import InputError
 from .noun import Noun, Part
 from .quantity import Quantity
-
-CLICK_SIGMA_PX = 0.7
-"""Standard deviation of a clicked end, per coordinate, where nothing was said."""
 
 
 @dataclass(frozen=True, eq=False)

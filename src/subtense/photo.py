@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from .arrays import Pixels
 from .errors import FileFormatError
 from .quantity import Note
 
@@ -73,7 +73,7 @@ class Photo:
         notes: doubts about the file.
     """
 
-    pixels: npt.NDArray[np.uint8]
+    pixels: Pixels
     metadata: Metadata
     path: Path
     digest: str
@@ -174,7 +174,7 @@ def _pillow_without_its_own_limit() -> Iterator[Any]:
             Image.MAX_IMAGE_PIXELS = own
 
 
-def _decoded(picture: Any, path: Path) -> npt.NDArray[np.uint8]:
+def _decoded(picture: Any, path: Path) -> Pixels:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -193,7 +193,7 @@ def _decoded(picture: Any, path: Path) -> npt.NDArray[np.uint8]:
         raise FileFormatError(path, f"is cut or damaged ({reason}); copy it again from the camera") from None
 
 
-def _upright(pixels: npt.NDArray[np.uint8], orientation: int) -> npt.NDArray[np.uint8]:
+def _upright(pixels: Pixels, orientation: int) -> Pixels:
     """EXIF orientation: 2 mirrored, 3 half turn, 4 mirrored top to bottom, 5 to 8 with a quarter turn."""
     if orientation in (2, 5, 7, 4):
         mirrored = pixels[:, ::-1]

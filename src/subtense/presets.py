@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 from .errors import InputError
 from .quantity import Quantity
@@ -42,6 +41,7 @@ class Preset:
 def presets() -> dict[str, Preset]:
     """All presets by name."""
     import tomllib
+    from importlib.resources import files
 
     table = tomllib.loads(files("subtense").joinpath("data/presets.toml").read_text("utf-8"))
     return {**{name: _class(name, row) for name, row in table["class"].items()},

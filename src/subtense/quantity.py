@@ -14,12 +14,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from .distribution import NORMAL, Array, Distribution
+from .arrays import Array
+from .distribution import HALF_WIDTH_95, NORMAL, Distribution
 from .errors import InputError
 from .noun import Noun, Part, plain
-
-HALF_WIDTH_95 = 1.959963984540054
-"""Half-width of a 95 % normal interval in standard deviations."""
 
 UNITS: dict[str, tuple[str, float]] = {
     "m": ("m", 1.0), "mm": ("m", 1e-3), "cm": ("m", 1e-2), "dm": ("m", 0.1), "km": ("m", 1e3),

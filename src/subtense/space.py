@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from .distribution import NORMAL, Array, Distribution
+from .arrays import Array
+from .distribution import NORMAL, Distribution
 from .errors import InputError
 from .noun import Noun, Part, fields_of
 from .quantity import Quantity

@@ -15,9 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from .distribution import Array
+from .arrays import Array, Pixels
 
 CURVE = 2.2
 """Exponent of the transfer curve: that of sRGB over most of its range."""
@@ -35,7 +34,7 @@ WIDEST_STRIP_PX = 6.0
 _SAMPLES = 1500
 
 
-def encoded_gray(pixels: npt.NDArray[np.uint8]) -> Array:
+def encoded_gray(pixels: Pixels) -> Array:
     """(H, W, 3) RGB to (H, W) encoded luminance, 0 to 1."""
     return np.asarray(pixels @ np.array([0.2126, 0.7152, 0.0722]) / 255.0)
 

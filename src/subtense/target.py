@@ -8,7 +8,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from .distribution import NORMAL, Array, Distribution
+from .arrays import Array
+from .distribution import NORMAL, Distribution
 from .errors import InputError
 from .noun import Noun, Part
 from .quantity import Quantity

@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..distribution import Array
+from ..arrays import Array, Pixels
 from ..observation import Observation
 from ..photo import Photo
 from ..subpixel import encoded_gray, refine_quad
@@ -58,7 +57,7 @@ def markers(photo: Photo, family: str | None = None) -> tuple[Observation, ...]:
     return tuple(sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))
 
 
-def _candidates(cv2: Any, gray: npt.NDArray[np.uint8], families: list[str]) -> Iterator[tuple[str, int, Array]]:
+def _candidates(cv2: Any, gray: Pixels, families: list[str]) -> Iterator[tuple[str, int, Array]]:
     """Exact readings first; then, only where there is none, those of weak families, and readings with corrected bits.
 
     Every 16th dark square reads as some marker of 16 bits, so such families are believed only in want of a stronger one.
@@ -74,7 +73,7 @@ def _candidates(cv2: Any, gray: npt.NDArray[np.uint8], families: list[str]) -> I
             return
 
 
-def _detected(cv2: Any, gray: npt.NDArray[np.uint8], name: str, correction: float) -> list[tuple[int, Array]]:
+def _detected(cv2: Any, gray: Pixels, name: str, correction: float) -> list[tuple[int, Array]]:
     parameters = cv2.aruco.DetectorParameters()
     parameters.errorCorrectionRate = correction
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX

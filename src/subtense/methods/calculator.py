@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..arrays import Array, Codes
 from ..assumptions import frontal
-from ..distribution import Array
 from ..focus import classical, close_focus
 from ..geometry import segment_depth
-from ..method import Method, Output, Reason, Reasons, reasons
+from ..method import Method, Output, Reason, reasons
 from ..quantity import Note, Quantity
 
 UNKNOWNS = ("distance", "size", "extent", "focal_length")
@@ -86,7 +86,7 @@ class Result:
     object_m_per_px: Array
     field_of_view_rad: Array
     angle_rad: Array
-    reason: Reasons
+    reason: Codes
 
 
 @dataclass(frozen=True)

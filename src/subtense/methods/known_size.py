@@ -13,13 +13,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..arrays import Array, Codes
 from ..assumptions import frontal
 from ..camera import Camera
-from ..distribution import Array
 from ..focus import close_focus, thin_lens
 from ..geometry import segment_depth
 from ..lenses import LENSES
-from ..method import Method, Output, Reason, Reasons, reasons
+from ..method import Method, Output, Reason, reasons
 from ..observation import Observation
 from ..quantity import Note, Quantity
 
@@ -51,7 +51,7 @@ class Result:
 
     range_m: Array
     depth_m: Array
-    reason: Reasons
+    reason: Codes
 
 
 def known_size(inputs: Inputs) -> Result:

@@ -16,13 +16,14 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..arrays import Array, Codes
 from ..camera import Camera
-from ..distribution import Array, Distribution
+from ..distribution import Distribution
 from ..errors import InputError
 from ..focus import close_focus, thin_lens
 from ..geometry import Pose, cross_matrix, rotation_from_vector
 from ..lenses import LENSES
-from ..method import Method, Output, Reason, Reasons, reasons
+from ..method import Method, Output, Reason, reasons
 from ..observation import Observation
 from ..quantity import Note, Quantity
 from ..target import Target
@@ -74,7 +75,7 @@ class Result:
     range_m: Array
     depth_m: Array
     tilt_rad: Array
-    reason: Reasons
+    reason: Codes
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,38 @@ response bends so much that an interval end would be off by half a unit of the s
 `joint` gives several outputs of several methods with their covariance, each shared noun moved once.
 """
 
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from .differences import Propagated, first_order
-from .draws import Draws, monte_carlo, sample
-from .joint import joint, mean_of
 from .measurement import measure
-from .rows import rows
+
+if TYPE_CHECKING:
+    from .draws import Draws as Draws
+    from .draws import monte_carlo as monte_carlo
+    from .draws import sample as sample
+    from .many import rows as rows
+    from .several import joint as joint
+    from .several import mean_of as mean_of
+
+_HOME = {
+    "Draws": "draws",
+    "monte_carlo": "draws",
+    "sample": "draws",
+    "joint": "joint",
+    "mean_of": "joint",
+    "rows": "rows",
+}
 
 __all__ = ["Draws", "Propagated", "first_order", "joint", "mean_of", "measure", "monte_carlo", "rows", "sample"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load what a single measurement does not need when it is asked for."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = found
+    return found

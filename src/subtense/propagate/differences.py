@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..distribution import Array, normal_quantile, t_quantile
+from ..arrays import Array, Codes
+from ..distribution import normal_quantile, t_quantile
 from ..method import Method
 from ..space import Correlations, Line, Moved, Space
 from .model import Function, Model, evaluate_at, model_of
@@ -52,7 +52,7 @@ class Propagated:
     cov: Array | None
     u_second_order: Array | None
     bend: Array
-    reason: npt.NDArray[np.int8]
+    reason: Codes
     quadratic: tuple[_Bent, ...] = ()
     curvature: Array | None = None
 
@@ -272,7 +272,7 @@ def rows_by_differences(model: Model, space: Space, level: float) -> Propagated:
 
 
 def _rows(
-    model: Model, space: Space, y0: Array, reason: npt.NDArray[np.int8], contributions: Array, variance: Array,
+    model: Model, space: Space, y0: Array, reason: Codes, contributions: Array, variance: Array,
     shift: Array, fourth: Array, level: float,
 ) -> Propagated:  # fmt: skip
     """Rows from their variance, mean shift and fourth cumulant."""
@@ -308,3 +308,10 @@ def _moved_line(
     if line.u is not None:
         numbers[j] = line.value[j]
     return values if values.shape == shape else np.broadcast_to(values, shape).copy()
+
+
+def tolerance(u: float, digits: int = 2) -> float:
+    """Half a unit of the last significant digit of u (JCGM 101, 7.9.2)."""
+    if not (u > 0 and math.isfinite(u)):
+        return math.inf
+    return float(5.0 * 10.0 ** (math.floor(math.log10(u) + 1e-12) - digits))

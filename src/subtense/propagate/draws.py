@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..distribution import Array
+from ..arrays import Array, Codes
 from ..method import Method, Reason
 from ..space import Correlations, Moved, Space
+from .differences import tolerance
 from .model import Function, Model, evaluate, model_of
 
 CHUNK = 8192
@@ -39,7 +39,7 @@ class Draws:
 
     names: tuple[str, ...]
     values: Array
-    reason: npt.NDArray[np.int8]
+    reason: Codes
     stable: bool = True
 
     @property
@@ -80,7 +80,7 @@ class Draws:
         return np.asarray(np.mean(~np.isfinite(self.values), axis=1))
 
 
-def _sorted_ends(values: Array, reason: npt.NDArray[np.int8]) -> tuple[Array, Array]:
+def _sorted_ends(values: Array, reason: Codes) -> tuple[Array, Array]:
     """Sorted draws twice: for the lower and the upper limit, with those that have no answer where they do most harm."""
     lost = ~np.isfinite(values)
     if not lost.any():
@@ -148,10 +148,3 @@ def _steady(statistics: Array, digits: int) -> bool:
     spread = 2 * np.std(np.where(np.isfinite(statistics), statistics, 0.0), axis=0, ddof=1) / math.sqrt(len(statistics))
     allowed = np.array([tolerance(float(u), digits) for u in np.mean(statistics[:, 1], axis=0)])
     return bool(np.all(spread <= allowed))
-
-
-def tolerance(u: float, digits: int = 2) -> float:
-    """Half a unit of the last significant digit of u (JCGM 101, 7.9.2)."""
-    if not (u > 0 and math.isfinite(u)):
-        return math.inf
-    return float(5.0 * 10.0 ** (math.floor(math.log10(u) + 1e-12) - digits))

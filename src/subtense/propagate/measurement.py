@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..distribution import Array
+from ..arrays import Array
 from ..errors import GeometryError, InputError
 from ..method import Method, Output, Reason
 from ..quantity import Contribution, Measurement, Note
 from ..space import Line, Space
-from .differences import Propagated, scene
-from .draws import Draws, adaptive, sample_space, tolerance
+from .differences import Propagated, scene, tolerance
 from .model import Model, evaluate_at, model_of
+
+if TYPE_CHECKING:
+    from .draws import Draws
 
 NEARLY_NORMAL = 0.4
 """Excess kurtosis up to which Cornish and Fisher's expansion is trusted: a uniform input may make half the variance."""
@@ -59,6 +61,8 @@ def measure(
     bent = [o for o, answer in enumerate(answers) if answer is None]
     drawn = None
     if bent:
+        from .draws import adaptive, sample_space  # many measurements need none
+
         digits = max(method.outputs[o].digits for o in bent)
         fixed = None if draws is None else sample_space(model, space, draws, np.random.default_rng(seed))
         drawn = fixed or adaptive(model, space, level, seed, bent, digits)

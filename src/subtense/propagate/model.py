@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..distribution import Array
+from ..arrays import Array, Codes
 from ..method import Method
 from ..space import Moved, Space
 
@@ -21,7 +20,7 @@ class Model:
     """A function with named outputs, of one or several inputs."""
 
     names: tuple[str, ...]
-    call: Callable[[tuple[Any, ...]], tuple[Array, npt.NDArray[np.int8]]]
+    call: Callable[[tuple[Any, ...]], tuple[Array, Codes]]
     most_draws: int = 1_000_000
 
 
@@ -33,7 +32,7 @@ def model_of(method: Method | Function, inputs: Any) -> Model:
     if isinstance(method, Method):
         return method_model(method, inputs)
 
-    def call(moved: tuple[Any, ...]) -> tuple[Array, npt.NDArray[np.int8]]:
+    def call(moved: tuple[Any, ...]) -> tuple[Array, Codes]:
         result = method(**{name: q.value for name, q in moved[0].items()})
         named = result if isinstance(result, Mapping) else {"result": result}
         values = np.stack(np.broadcast_arrays(*(np.asarray(v, float) for v in named.values())))
@@ -48,7 +47,7 @@ def method_model(method: Method, inputs: Any) -> Model:
     start = (method.start(inputs),) if method.start else ()
     names = tuple(output.name for output in method.outputs)
 
-    def call(moved: tuple[Any, ...]) -> tuple[Array, npt.NDArray[np.int8]]:
+    def call(moved: tuple[Any, ...]) -> tuple[Array, Codes]:
         result = method.function(moved[0], *start)
         reason = np.asarray(result.reason)
         values = np.empty((len(names), *reason.shape))
@@ -63,7 +62,7 @@ def method_model(method: Method, inputs: Any) -> Model:
     return Model(names, call, method.most_draws)
 
 
-def evaluate_at(model: Model, space: Space, z: Array) -> tuple[Array, npt.NDArray[np.int8]]:
+def evaluate_at(model: Model, space: Space, z: Array) -> tuple[Array, Codes]:
     """Outputs (o, n) of one scene at standardised deviations z (m, n)."""
     moved: Moved = {}
     first = 0
@@ -73,7 +72,7 @@ def evaluate_at(model: Model, space: Space, z: Array) -> tuple[Array, npt.NDArra
     return evaluate(model, space, moved, z.shape[1])
 
 
-def evaluate(model: Model, space: Space, moved: Moved, n: int) -> tuple[Array, npt.NDArray[np.int8]]:
+def evaluate(model: Model, space: Space, moved: Moved, n: int) -> tuple[Array, Codes]:
     """Outputs (o, n) of one scene with moved numbers; what no moved number enters is the same n times."""
     values, reason = model.call(space.rebuilt(moved))
     if values.ndim == 1:

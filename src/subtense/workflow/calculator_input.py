@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import assumptions
 from ..errors import InputError
 from ..methods.calculator import Inputs
-from ..presets import Preset, find_preset
 from ..quantity import Assume, Quantity
+
+if TYPE_CHECKING:
+    from ..presets import Preset
 
 _HOW: dict[str, tuple[str, str, Assume]] = {
     "focal": ("m", "mm", assumptions.focal_length),
@@ -27,6 +29,14 @@ _HOW: dict[str, tuple[str, str, Assume]] = {
 """Option: the unit it is kept in, the unit of a bare number, and what is assumed of it without ±."""
 
 
+def _preset(name: str | None) -> Preset | None:
+    if not name:
+        return None
+    from ..presets import find_preset  # most calculations name none
+
+    return find_preset(name, "--preset")
+
+
 def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity | None]:
     """The calculator's Inputs, and the image height where it was said.
 
@@ -37,7 +47,7 @@ def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity |
         InputError: a text that can't be read, or something missing: which, and what to give.
     """
     said = {name: _read(name, text.get(name)) for name in _HOW}
-    preset = find_preset(text["preset"], "--preset") if text.get("preset") else None  # type: ignore[arg-type]
+    preset = _preset(text.get("preset"))
     image_width = said["image_width"] or (preset.image_width if preset else None)
     if image_width is None:
         raise InputError("--image-width", None, "give the picture's width in pixels, or a --preset of a camera class")

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..distribution import Array
+from ..arrays import Array, Codes
 from ..errors import InputError
 from ..method import Method
 from ..quantity import Quantity
@@ -28,7 +27,7 @@ def joint(pairs: Sequence[tuple[Method, Any]], *, draws: int = 100_000, seed: in
     space = Space([inputs for _, inputs in pairs])
     models = [model_of(method, inputs) for method, inputs in pairs]
 
-    def call(moved: tuple[Any, ...]) -> tuple[Array, npt.NDArray[np.int8]]:
+    def call(moved: tuple[Any, ...]) -> tuple[Array, Codes]:
         results = [model.call((one,)) for model, one in zip(models, moved, strict=True)]
         shape = np.broadcast_shapes(*(reason.shape for _, reason in results))
         values = np.concatenate([np.broadcast_to(v, (len(v), *shape)) for v, _ in results])

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..distribution import Array, normal_quantile
+from ..arrays import Array
+from ..distribution import normal_quantile
 from ..errors import InputError
 from ..method import Method, Partials
 from ..space import Line, Space, map_nouns
