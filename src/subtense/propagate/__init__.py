@@ -26,9 +26,9 @@ _HOME = {
     "Draws": "draws",
     "monte_carlo": "draws",
     "sample": "draws",
-    "joint": "joint",
-    "mean_of": "joint",
-    "rows": "rows",
+    "joint": "several",
+    "mean_of": "several",
+    "rows": "many",
 }
 
 __all__ = ["Draws", "Propagated", "first_order", "joint", "mean_of", "measure", "monte_carlo", "rows", "sample"]
