@@ -45,13 +45,15 @@ def report(document: Document) -> str:
 
 def _camera(document: Document) -> Iterator[str]:
     camera = document.camera or {}
-    f, u = camera["f_px"], camera.get("u_f_px")
-    doubt = f" ± {number(1.96 * u, 'px', u)} (95 %)" if u else ""
-    yield f"camera: f = {number(f, 'px', u)}{doubt}, {camera['source']}"
+    yield f"camera: {_focal(camera['f_px'], camera.get('u_f_px'))}, {camera['source']}"
     for other in camera.get("hypotheses", ()):
         if not other["chosen"]:
-            said = f"f = {number(other['f_px'], 'px', other['u_f_px'])}, " if other["f_px"] else "nothing: "
+            said = _focal(other["f_px"], other["u_f_px"]) + ", " if other["f_px"] else "nothing: "
             yield f"  {other['source']} says {said}{other['text']}"
+
+
+def _focal(f_px: float, u: float | None) -> str:
+    return f"f = {number(f_px, 'px', u)}" + (f" ± {number(1.96 * u, 'px', u)} (95 %)" if u else "")
 
 
 def _group(group: list[Measurement]) -> Iterator[str]:

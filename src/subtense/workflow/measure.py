@@ -18,7 +18,7 @@ from ..method import Method
 from ..methods import known_size, pose
 from ..observation import Observation
 from ..photo import Photo
-from ..quantity import Measurement, Quantity
+from ..quantity import Measurement, Note, Quantity
 from ..target import Target
 from .given import given, inputs_from_json, inputs_from_text, read_json
 from .improve import improved
@@ -131,7 +131,11 @@ def camera_document(photo: Photo, given_camera: str | None = None, *, level: flo
     camera = resolved.camera
     half = normal_quantile(0.5 + level / 2) * camera.u_f_px
     f = float(camera.f_px)
-    m = Measurement("focal_length_px", f, camera.u_f_px, f - half, f + half, "px", resolved.chosen.source, level)
+    why = "what was given" if given_camera is not None else "the smallest relative u of all sources"
+    notes = (Note("camera_source", f"{resolved.chosen.source} was chosen: {why}"),)
+    m = Measurement(
+        "focal_length_px", f, camera.u_f_px, f - half, f + half, "px", resolved.chosen.source, level, notes=notes
+    )
     return _document(photo, resolved, [m], [])
 
 
