@@ -6,7 +6,6 @@ sides are fitted again (see `subpixel`). The size of a marker is that of its bla
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -45,32 +44,34 @@ def markers(photo: Photo, family: str | None = None) -> tuple[Observation, ...]:
     gray = cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY)
     encoded = encoded_gray(photo.pixels)
     found: list[Observation] = []
-    for name, number, corners in _candidates(cv2, gray, [family] if family else list(FAMILIES)):
-        if any(_same_place(corners, other.points_px) for other in found):
-            continue
-        module = float(np.sqrt(_area(corners))) / FAMILIES[name][1]
-        quad = refine_quad(encoded, corners, module)
-        if quad is not None and quad.misfit < WORST_MISFIT:
-            found.append(
-                Observation(quad.corners_px, cov=quad.cov, label=f"{name} id {number}", source="edges of the marker")
-            )
+    for correction, names in _passes([family] if family else list(FAMILIES)):
+        for name in names:
+            for number, corners in _detected(cv2, gray, name, correction):
+                if any(_same_place(corners, other.points_px) for other in found):
+                    continue
+                seen = _located(encoded, name, number, corners)
+                found += [seen] if seen else []
+        if found:
+            break
     return tuple(sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))
 
 
-def _candidates(cv2: Any, gray: Pixels, families: list[str]) -> Iterator[tuple[str, int, Array]]:
-    """Exact readings first; then, only where there is none, those of weak families, and readings with corrected bits.
+def _passes(families: list[str]) -> tuple[tuple[float, list[str]], ...]:
+    """(share of bits corrected, families): exact readings first; the next only where the one before found nothing.
 
     Every 16th dark square reads as some marker of 16 bits, so such families are believed only in want of a stronger one.
     """
     strong = [name for name in families if name not in WEAK]
-    for correction, names in ((0.0, strong), (0.0, families), (0.5, strong), (0.5, families)):
-        count = 0
-        for name in names:
-            for number, corners in _detected(cv2, gray, name, correction):
-                count += 1
-                yield name, number, corners
-        if count:
-            return
+    return (0.0, strong), (0.0, families), (0.5, strong), (0.5, families)
+
+
+def _located(encoded: Array, name: str, number: int, corners: Array) -> Observation | None:
+    """A marker with its corners from its edges; None where it has none to see."""
+    module = float(np.sqrt(_area(corners))) / FAMILIES[name][1]
+    quad = refine_quad(encoded, corners, module)
+    if quad is None or quad.misfit >= WORST_MISFIT:
+        return None
+    return Observation(quad.corners_px, cov=quad.cov, label=f"{name} id {number}", source="edges of the marker")
 
 
 def _detected(cv2: Any, gray: Pixels, name: str, correction: float) -> list[tuple[int, Array]]:

@@ -54,13 +54,8 @@ def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity |
     unknowns: dict[str, Any] = {
         "focal_length": said["focal"], "size": said["size"], "extent": said["extent"], "distance": said["distance"],
     }  # fmt: skip
-    if (
-        unknowns["focal_length"] is None
-        and preset
-        and None not in [unknowns[n] for n in ("size", "extent", "distance")]
-    ):
-        pass  # the focal length is what is asked for
-    elif unknowns["focal_length"] is None and preset:
+    asked_for_focal = all(unknowns[name] for name in ("size", "extent", "distance"))
+    if preset and not unknowns["focal_length"] and not asked_for_focal:
         unknowns["focal_length"] = preset.focal_length
     optional: dict[str, Any] = {name: said[name] for name in ("aspect", "tilt") if said[name] is not None}
     optional |= _offset(text.get("offset"))
