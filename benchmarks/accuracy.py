@@ -55,7 +55,7 @@ def examples() -> list[Row]:
         ("street.jpg", "person", ("soles", "head_top"), 1.75), ("street.jpg", "car_rear", ("bottom_left", "bottom_right"), 1.8),
         ("facade.jpg", "door", ("bottom_left", "top_left"), 2.1),
     )  # fmt: skip
-    rows = [("picture", "what", "true range", "measured", "95 %", "error")]
+    rows = [("picture", "what", "true range", "measured", "95 %", "error", "in u")]
     for file, thing, ends, size in things:
         known = {p["name"]: p for p in next(o for o in pictures[file]["objects"] if o["name"] == thing)["points"]}
         pair = [known[name] for name in ends] if ends else list(known.values())
@@ -70,15 +70,16 @@ def examples() -> list[Row]:
 
 
 def outcome(m, true: float) -> Row:
-    """Measured value, interval and relative error."""
-    return f"{m.value:.3f} m", f"{m.low:.3f} to {m.high:.3f} m", percent(m.value / true - 1, 2)
+    """Measured value, interval, relative error, and the error in u."""
+    interval = f"{m.low:.4g} to {m.high:.4g} m"
+    return f"{m.value:.4g} m", interval, percent(m.value / true - 1, 2), f"{(m.value - true) / m.u:+.1f} u"
 
 
 def frc_2019() -> list[Row]:
     """Width of a lit target at 21 to 108 inches, camera from its calibration."""
     folder = DATA / "known_size" / "frc2019"
     truth = json.loads((folder / "truth.json").read_text())
-    rows = [("picture", "true depth", "measured", "95 %", "error")]
+    rows = [("picture", "true depth", "measured", "95 %", "error", "in u")]
     for name, distance in truth["images"].items():
         photo = Photo.load(folder / name)
         size = Quantity.interval(truth["known_width_m"], 0.002, "m")
@@ -103,7 +104,7 @@ def april_vision(tmp: Path) -> list[Row]:
     }
     path = tmp / "camera.json"
     path.write_text(json.dumps(camera))
-    rows = [("picture", "true range", "measured", "95 %", "error")]
+    rows = [("picture", "true range", "measured", "95 %", "error", "in u")]
     places = {int(row["Index"]): row for row in csv.DictReader((folder / "locations.csv").read_text().splitlines())}
     for picture in sorted(folder.glob("img-*.png")):
         true = float(places[int(picture.stem[-3:])]["r"])
