@@ -71,7 +71,7 @@ def test_machine_formats_stand_alone_on_the_output(form):
         ([*BELT[:-1], "5000"], 2, r"extent is '5000 px'; the picture has 4096 px"),
         ([*BELT, "--distance", "3 m"], 2, "leave out exactly one"),
         ([*BELT, "--format", "xml"], 2, "--format is 'xml'; give text, json, csv"),
-        ([*BELT, "--level", "95"], 2, r"level is 95.0; give a coverage"),
+        ([*BELT, "--level", "95"], 2, r"level is 95.0; give a coverage from 0.5 to 0.999"),
         (["calc", "--size", "3"], 2, "--image-width is missing"),
         ([*BELT, "--size", "6 ft 2"], 2, "name the unit of every part"),
         (["calc", "--preset", "hubble", "--size", "3", "--extent", "3"], 2, "--preset is 'hubble'"),
@@ -93,6 +93,9 @@ def test_machine_formats_stand_alone_on_the_output(form):
         (["camera", "{photo}"], 2, "no camera"),
         (["camera", "{photo}", "--camera", "cal.yaml"], 2, "cal.yaml: no such file"),
         (["method", "known_size", "--size", "3 mm"], 2, "say how well it is known"),
+        (["method", "known_size", "--size", "0.2 exact"], 2, "give a length in m, mm"),
+        ([*BELT[:-2], "--distance", "10 mm"], 3, "inside the focal length"),
+        ([*BELT[:-2], "--distance", "50 mm"], 3, "the picture has 4096 px along its width"),
         (["method", "known_size", "--size", "3 ± 1 mm"], 2, "also needs camera, ends"),
         (["method", "known_size"], 2, "give either --inputs FILE or the single inputs"),
     ],
@@ -157,3 +160,18 @@ def test_help_and_calc_load_nothing_heavy():
     ):
         command = [sys.executable, "-c", code.format(arguments=arguments, modules=modules)]
         assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+def test_the_photo_itself_is_never_written_over(photo):
+    before = photo.read_bytes()
+    result = run("measure", photo, "--line", "50,50,250,60", "--size", "20", "--camera", "f=300px", "--overlay", photo)
+    assert result.exit_code == 2 and "the photo itself" in result.stderr
+    assert photo.read_bytes() == before
+
+
+@pytest.mark.parametrize("content", ['{"size": 0.2}', '{"size": "0.2 m exact"}', "[]", "{", '{"size": {}}', '{"what": 1}'])
+def test_inputs_that_are_no_nouns_are_one_line(tmp_path, content):
+    path = tmp_path / "inputs.json"
+    path.write_text(content)
+    result = run("method", "known_size", "--inputs", path)
+    assert result.exit_code == 2 and result.stderr.count("\n") == 1

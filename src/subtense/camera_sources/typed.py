@@ -9,16 +9,20 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from .. import assumptions
 from ..camera import Camera
 from ..errors import InputError
 from ..hypothesis import Hypothesis, unknown_lens
 from ..photo import Photo
-from ..presets import find_preset
-from ..quantity import Quantity
+from ..presets import Preset, find_preset
+from ..quantity import Note, Quantity
 from ..tagged_size import tagged_size
 
 NAME = "typed"
+CUT_U = 0.04
+"""Relative u where a picture does not have its sensor's proportions (traps 8: a 16:9 picture may be 8 % off)."""
 KEYS = ("f", "sensor", "fov")
 
 
@@ -31,6 +35,7 @@ def camera(text: str, photo: Photo) -> Hypothesis:
     found = _from_pairs(text, photo) if "=" in text else _from_preset(text, photo)
     # a focal length in pixels is of the picture at hand; every other text is of the whole, unzoomed sensor
     notes = tagged_size(photo).notes if found.nominal_focal_m else ()
+    notes = (*notes, *_cut_note(text, photo))
     return Hypothesis(NAME, found, found.source, notes)
 
 
@@ -112,7 +117,27 @@ def _from_preset(text: str, photo: Photo) -> Camera:
         made = _from_lengths(
             preset.focal_length, preset.sensor_width, photo, f"preset {preset.name}: the range of its class"
         )
-    return replace(made, id=None)
+    if not _cut_from(preset, photo):
+        return made
+    cov = np.array(made.cov)
+    cov[0, 0] += (CUT_U * float(made.f_px)) ** 2
+    return replace(made, cov=cov, id=None)
+
+
+def _cut_from(preset: Preset, photo: Photo) -> bool:
+    """Whether the photo's proportions are not those of the preset's sensor: a mode that may use a part of it only."""
+    if preset.sensor_height is None:
+        return False
+    long, short = max(photo.stored_size_px), min(photo.stored_size_px)
+    return abs(long / short / float(preset.sensor_width.value / preset.sensor_height.value) - 1) > 0.04
+
+
+def _cut_note(text: str, photo: Photo) -> tuple[Note, ...]:
+    if "=" in text or not _cut_from(find_preset(text, "--camera"), photo):
+        return ()
+    size = f"{photo.width_px} x {photo.height_px} px"
+    return (Note("aspect_mismatch", f"a picture of {size} does not have the sensor's proportions: this mode of the camera may use "
+                 f"a part of the sensor only; u is widened by {100 * CUT_U:.0f} %", "calibrate the camera in this mode"),)  # fmt: skip
 
 
 def _above_zero(name: str, quantity: Quantity, text: str) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..arrays import Array, Codes
 from ..assumptions import frontal
+from ..errors import InputError
 from ..focus import classical, close_focus
 from ..geometry import segment_depth
 from ..method import Method, Output, Reason, reasons
@@ -65,6 +66,10 @@ class Inputs:
     offset_x: Quantity = field(default_factory=centred, metadata={"unit": "px"})
     offset_y: Quantity = field(default_factory=centred, metadata={"unit": "px"})
     focus: Quantity = field(default_factory=classical, metadata={"unit": "1"})
+
+    def __post_init__(self) -> None:
+        if self.along not in ("width", "height"):
+            raise InputError("along", self.along, "give width or height")
 
     @property
     def unknown(self) -> str:
@@ -207,12 +212,21 @@ def _angle(x1: Array, y1: Array, x2: Array, y2: Array) -> Array:
     return np.asarray(np.arctan2(cross, x1 * x2 + y1 * y2 + 1))
 
 
+_TURNED = {
+    "distance": "its distance comes out too large",
+    "size": "its size comes out too small",
+    "extent": "it looks shorter than that",
+    "focal_length": "the focal length comes out too small",
+}
+
+
 def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
     """`frontal_assumption`, `close_focus`, `off_axis`."""
     found = []
     if float(inputs.tilt.value) == 0 and float(inputs.tilt.u) == 0:
-        found.append(Note("frontal_assumption", "the relation holds for an object that faces the camera; turned by 10° "
-                          "it reads 1.5 % too far, by 20° 6 %", 'state its tilt, as in --tilt "0 ± 20 deg (limits)"'))  # fmt: skip
+        turned = _TURNED[inputs.unknown]
+        text = f"the relation holds for an object that faces the camera; turned by 10°, {turned} by 1.5 %, by 20° 6 %"
+        found.append(Note("frontal_assumption", text, 'state its tilt, as in --tilt "0 ± 20 deg (limits)"'))
     slant = float(result.range_m / result.distance_m)
     if slant > 1.001:
         found.append(Note("off_axis", f"off the axis the straight line to the object is {100 * (slant - 1):.1f} % longer than "

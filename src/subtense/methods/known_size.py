@@ -137,7 +137,8 @@ def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
     elif inputs.tilt.source.startswith("assumed"):
         limit = math.degrees(u_tilt * math.sqrt(3))
         found.append(Note("unknown_tilt", f"the object's tilt is unknown; up to {limit:.0f}° is in the interval, which "
-                          "reaches to the near side", 'state it, as in --tilt "0 ± 3 deg", or use a marker'))  # fmt: skip
+                          "reaches to the near side; turned further, the distance is only an upper bound",
+                          'state it, as in --tilt "0 ± 3 deg", or use a marker'))  # fmt: skip
     note = close_focus(inputs.camera.nominal_focal_m, float(result.depth_m), inputs.focus)
     return (*found, note) if note else tuple(found)
 

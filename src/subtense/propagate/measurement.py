@@ -20,6 +20,8 @@ from .model import Model, evaluate_at, model_of
 if TYPE_CHECKING:
     from .draws import Draws
 
+HIGHEST_LEVEL = 0.999
+"""Beyond it the tails of no law are known well enough, and draws don't reach them."""
 NEARLY_NORMAL = 0.4
 """Excess kurtosis up to which Cornish and Fisher's expansion is trusted: a uniform input may make half the variance."""
 
@@ -42,8 +44,8 @@ def measure(
     Raises:
         GeometryError: this view has no finite answer.
     """
-    if not 0.5 <= level < 1:
-        raise InputError("level", level, "give a coverage from 0.5 to below 1, as 0.95")
+    if not 0.5 <= level <= HIGHEST_LEVEL:
+        raise InputError("level", level, f"give a coverage from 0.5 to {HIGHEST_LEVEL}, as 0.95")
     inputs = method.prepare(inputs)
     space = Space((inputs,))
     if space.leading:

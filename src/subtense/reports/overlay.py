@@ -26,6 +26,8 @@ def write(document: Document, photo: Photo, path: Path) -> None:
         raise InputError("--overlay", str(path), f"give a name that ends in {', '.join(FORMATS)}")
     if not path.parent.is_dir():
         raise InputError("--overlay", str(path), "its folder does not exist")
+    if path.exists() and photo.path.exists() and path.samefile(photo.path):
+        raise InputError("--overlay", str(path), "that is the photo itself; give another name")
     picture = draw(document, photo)
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     try:

@@ -34,7 +34,7 @@ def report(document: Document) -> str:
     if document.photo:
         p = document.photo
         lines += [f"{p['name']}, {p['width_px']} x {p['height_px']} px"]
-    if document.camera:
+    if document.camera and "lens" in document.camera:  # a calculator's focal length stands among its results
         lines += _camera(document)
     lines += _notes(document.notes)
     for label in dict.fromkeys(m.label for m in document.measurements):
@@ -62,7 +62,7 @@ def _group(group: list[Measurement]) -> Iterator[str]:
     yield f"{title}{TITLES.get(head.what, head.what)}  {headline(head)}"
     how = "" if head.evaluation == "first order" else f"   ({head.evaluation})"
     if head.unit == "m":
-        yield f"  unrounded {_unrounded(head)}{how}"
+        yield f"  nominal {_unrounded(head)}{how}"
     for other in others:
         yield f"  {TITLES.get(other.what, other.what):<42}{headline(other)}"
     if head.budget:
@@ -81,7 +81,7 @@ def headline(m: Measurement) -> str:
     value = number(m.value, m.unit, _doubt(m)) if m.unit == "m" else _unrounded(m)
     if m.u == 0:
         return f"{value}   exact"
-    level = f"{100 * m.level:g} %"
+    level = f"{100 * m.level:.8g} %"
     if m.low is None and m.high is None:
         return f"{value}   {level}: open on both sides"
     name, factor = fitting_unit(m.value, m.unit)

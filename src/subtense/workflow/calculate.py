@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import propagate
 from ..document import Document
-from ..errors import InputError
+from ..errors import GeometryError, InputError
 from ..methods import calculator
 from ..quantity import Measurement, Quantity
 from .given import given
@@ -38,6 +38,7 @@ def calculate(
     unknown = inputs.unknown
     found = propagate.measure(calculator.METHOD, inputs, level=level, seed=seed, given=given(inputs))
     by_name = dict(zip((o.name for o in calculator.METHOD.outputs), found, strict=True))
+    _check_answer(by_name, inputs, image_height)
     chosen = [by_name[name] for name in dict.fromkeys((_FIELD_OF[unknown], *_ALWAYS))]
     return Document(improved(tuple(_headed(chosen))), _camera(by_name, inputs))
 
@@ -51,7 +52,19 @@ def _headed(measurements: list[Measurement]) -> list[Measurement]:
 def _camera(found: dict[str, Measurement], inputs: calculator.Inputs) -> dict[str, Any]:
     f = found["focal_length_px"]
     return {"f_px": f.value, "u_f_px": f.u, "width_px": int(inputs.image_width.value), "height_px": None,
-            "source": "focal length, sensor width and image width as given"}  # fmt: skip
+            "source": "the relation between focal length, sensor and picture"}  # fmt: skip
+
+
+def _check_answer(found: dict[str, Measurement], inputs: calculator.Inputs, image_height: Quantity | None) -> None:
+    """Refuse what no camera sees: an object inside the focal length, or one that does not fit into the picture."""
+    distance, focal, extent = (found[name].value for name in ("distance_m", "focal_length_m", "extent_px"))
+    if distance <= focal:
+        text = f"at {distance * 1000:g} mm the object lies inside the focal length of {focal * 1000:.4g} mm; no lens draws it"
+        raise GeometryError(text, code="inside_focal_length")
+    limit = inputs.image_width if inputs.along == "width" else image_height
+    if limit is not None and extent > float(limit.value):
+        text = f"the object would span {extent:.0f} px, and the picture has {float(limit.value):g} px along its {inputs.along}"
+        raise GeometryError(text, code="out_of_picture")
 
 
 def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
@@ -59,8 +72,6 @@ def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
     if len(missing) != 1:
         names = ", ".join(calculator.UNKNOWNS)
         raise InputError("the unknown", ", ".join(missing) or "nothing", f"leave out exactly one of {names}")
-    if inputs.along not in ("width", "height"):
-        raise InputError("along", inputs.along, "give width or height")
     for name in (*calculator.UNKNOWNS, "sensor_width", "image_width", "aspect"):
         quantity = getattr(inputs, name)
         if quantity is not None and not np.all(np.asarray(quantity.value) > 0):

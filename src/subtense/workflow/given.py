@@ -15,8 +15,8 @@ from ..method import Method
 from ..noun import Noun, fields_of
 from ..quantity import Quantity
 
-BARE = {"m": "mm", "rad": "deg"}
-"""The unit a bare number is read in, where it is not the one it is kept in."""
+NAMED = {"m": "no unit", "rad": "no unit"}
+"""Units that must be written: what has no unit here is refused rather than read as metres or as millimetres."""
 
 
 def given(inputs: Any) -> dict[str, Any]:
@@ -62,6 +62,10 @@ def inputs_from_json(method: Method, data: Mapping[str, Any]) -> Any:
             values[name] = values.get(str(value["$ref"]).rpartition("/")[2])
         elif isinstance(value, Mapping):
             values[name] = _noun_from_json(kinds[name], name, value)
+        elif value is not None and issubclass(kinds[name], Noun):
+            raise InputError(
+                f"{name} in the inputs", value, f"give a {kinds[name].__name__} as an object, as `given` has it in JSON"
+            )
         else:
             values[name] = value
     return _made(method, values)
@@ -82,7 +86,7 @@ def inputs_from_text(method: Method, texts: Mapping[str, str]) -> Any:
         if text.startswith("@"):
             values[name] = _noun_from_json(kind, option, read_json(Path(text[1:])))
         elif kind is Quantity:
-            values[name] = Quantity.parse(text, units[name], bare=BARE.get(units[name]), name=option)
+            values[name] = Quantity.parse(text, units[name], bare=NAMED.get(units[name]), name=option)
         elif issubclass(kind, Noun):
             values[name] = kind.parse(text, name=option)
         else:
