@@ -169,7 +169,9 @@ def test_the_photo_itself_is_never_written_over(photo):
     assert photo.read_bytes() == before
 
 
-@pytest.mark.parametrize("content", ['{"size": 0.2}', '{"size": "0.2 m exact"}', "[]", "{", '{"size": {}}', '{"what": 1}'])
+@pytest.mark.parametrize(
+    "content", ['{"size": 0.2}', '{"size": "0.2 m exact"}', "[]", "{", '{"size": {}}', '{"what": 1}']
+)
 def test_inputs_that_are_no_nouns_are_one_line(tmp_path, content):
     path = tmp_path / "inputs.json"
     path.write_text(content)
