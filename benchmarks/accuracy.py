@@ -3,7 +3,6 @@
 The real pictures lie outside the repository (../shared/data); without them their part of the page is left as it is.
 """
 
-import csv
 import json
 import re
 import sys
@@ -93,21 +92,9 @@ def frc_2019() -> list[Row]:
 
 def april_vision(tmp: Path) -> list[Row]:
     """Tags of 0.2 m at 1 and 2 m, synthetic pictures of another project, camera known."""
-    folder = DATA / "fiducial" / "april_vision_synth"
-    camera = {
-        "width_px": 800,
-        "height_px": 800,
-        "f_px": 1293.0912575,
-        "cx_px": 399.5,
-        "cy_px": 399.5,
-        "cov": np.zeros((4, 4)).tolist(),
-    }
-    path = tmp / "camera.json"
-    path.write_text(json.dumps(camera))
+    path, pictures = real.april_vision(DATA / "fiducial" / "april_vision_synth", tmp)
     rows = [("picture", "true range", "measured", "95 %", "error", "in u")]
-    places = {int(row["Index"]): row for row in csv.DictReader((folder / "locations.csv").read_text().splitlines())}
-    for picture in sorted(folder.glob("img-*.png")):
-        true = float(places[int(picture.stem[-3:])]["r"])
+    for picture, true in pictures:
         document = measure_markers(Photo.load(picture), Quantity.exact(0.2, "m"), camera=str(path))
         rows.append((picture.name, f"{true:.4f} m", *outcome(document.measurements[0], true)))
     return rows

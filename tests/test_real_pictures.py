@@ -38,33 +38,31 @@ def test_frc_2019_targets_by_their_width(shared_data):
         assert depth.low < distance < depth.high, name
 
 
-def test_april_vision_tags_by_the_command_line(shared_data, tmp_path):
-    folder = shared_data / "fiducial" / "april_vision_synth"
-    camera = {
-        "width_px": 800,
-        "height_px": 800,
-        "f_px": 1293.0912575,
-        "cx_px": 399.5,
-        "cy_px": 399.5,
-        "cov": np.zeros((4, 4)).tolist(),
-    }
-    (tmp_path / "camera.json").write_text(json.dumps(camera))
+def april_vision(folder, tmp):
+    """The calibration file of the april_vision pictures, written to `tmp`, and (picture, true range in m) of each."""
+    camera = {"width_px": 800, "height_px": 800, "f_px": 1293.0912575, "cx_px": 399.5, "cy_px": 399.5}
+    path = tmp / "camera.json"
+    path.write_text(json.dumps({**camera, "cov": np.zeros((4, 4)).tolist()}))
     rows = {int(row["Index"]): row for row in csv.DictReader((folder / "locations.csv").read_text().splitlines())}
+    return path, [(p, float(rows[int(p.stem[-3:])]["r"])) for p in sorted(folder.glob("img-*.png"))]
+
+
+def test_april_vision_tags_by_the_command_line(shared_data, tmp_path):
+    camera, pictures = april_vision(shared_data / "fiducial" / "april_vision_synth", tmp_path)
     checked = 0
-    for path in sorted(folder.glob("img-*.png")):
+    for path, true in pictures:
         words = [
             "measure",
             path,
             "--marker-size",
             "200 mm exact",
             "--camera",
-            tmp_path / "camera.json",
+            camera,
             "--format",
             "json",
         ]
         result = CliRunner().invoke(main, [str(w) for w in words], catch_exceptions=False)
         found = json.loads(result.output)["measurements"][0]
-        true = float(rows[int(path.stem[-3:])]["r"])
         assert found["label"] == "36h11 id 14"
         assert found["value"] == pytest.approx(true, rel=0.005), path.name
         assert abs(found["value"] - true) < 3 * found["u"], path.name
