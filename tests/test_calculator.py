@@ -39,12 +39,12 @@ def test_a_statue_from_a_drone():
     assert typed(**STATUE).measurements[0].value * 1000 == pytest.approx(232_851.06, abs=0.005)
 
 
-@pytest.mark.parametrize("unknown", ["focal", "size", "extent", "distance"])
+@pytest.mark.parametrize("unknown", ["focal", "size", "extent", "distance", "sensor_width", "image_width"])
 def test_any_one_can_be_left_out(unknown):
     texts = {**BELT, "distance": "13556.5012 mm"}
     known = texts.pop(unknown)
     m = typed(**texts).measurements[0]
-    scale = 1 if unknown == "extent" else 1000
+    scale = 1 if unknown in ("extent", "image_width") else 1000
     assert m.value * scale == pytest.approx(float(str(known).split()[0]), rel=1e-6)
     assert m.low < m.value < m.high
 
@@ -61,16 +61,15 @@ def test_solving_for_each_value_gives_back_the_others(unknown, tilt, x, y, along
         "along": along, "aspect": q(aspect, "1"), "tilt": q(tilt, "rad"), "offset_x": q(x, "px"), "offset_y": q(y, "px"),
         "focus": q(focus, "1"),
     }  # fmt: skip
-    known = {"focal_length": q(0.035, "m"), "size": q(0.2, "m"), "extent": q(150, "px")}
-    first = calculator(Inputs(q(0.0141, "m"), q(4096, "px"), **known, **more))
+    known = {
+        "focal_length": q(0.035, "m"), "sensor_width": q(0.0141, "m"), "image_width": q(4096, "px"),
+        "size": q(0.2, "m"), "extent": q(150, "px"),
+    }  # fmt: skip
+    first = calculator(Inputs(**known, **more))
     known["distance"] = q(float(first.distance_m), "m")
-    wanted = {"focal_length": 0.035, "size": 0.2, "extent": 150, "distance": float(first.distance_m)}[unknown]
-    del known[unknown]
-    again = calculator(Inputs(q(0.0141, "m"), q(4096, "px"), **known, **more))
-    field = {"focal_length": "focal_length_m", "size": "size_m", "extent": "extent_px", "distance": "distance_m"}[
-        unknown
-    ]
-    assert float(getattr(again, field)) == pytest.approx(wanted, rel=1e-9)
+    wanted = known.pop(unknown)
+    again = calculator(Inputs(**known, **more))
+    assert float(getattr(again, f"{unknown}_{wanted.unit}")) == pytest.approx(float(wanted.value), rel=1e-9)
     assert float(again.range_m) == pytest.approx(float(first.range_m), rel=1e-9)
 
 

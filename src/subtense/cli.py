@@ -84,7 +84,8 @@ def _show(document: Document, form: str) -> None:
 def calc(form: str, level: float, seed: int, **text: str | None) -> None:
     """Distance = size x focal length in pixels / extent in pixels; leave one value out to solve for it.
 
-    Leave out --distance, --size, --extent or --focal. What is said without ± gets an honest default, marked "assumed".
+    Leave out --distance, --size, --extent, --focal, --sensor-width or --image-width. What is said without ± gets an
+    honest default, marked "assumed".
     """
     from .workflow.calculate import calculate
     from .workflow.calculator_input import calculator_input

@@ -14,6 +14,10 @@ CLOSE_FOCAL_LENGTHS = 50
 """Below so many focal lengths the extension is noted."""
 
 
+NO_EXTENSION = Quantity.exact(0.0, "1", "the camera is calibrated")
+"""Of a camera whose focal length holds its focus extension already: nothing is doubtful about it."""
+
+
 def thin_lens() -> Quantity:
     """All of the extension is added, and as much again is its u."""
     return Quantity.normal(1.0, 1.0, "1", "assumed: thin lens focused on the object, inner focusing possible")

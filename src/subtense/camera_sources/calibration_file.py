@@ -23,13 +23,18 @@ ASSUMED_CENTRE = 0.005
 """u of its principal point, in picture widths."""
 
 
-def camera(path: Path, photo: Photo) -> Hypothesis:
+def camera(path: Path, photo: Photo, data: bytes | None = None) -> Hypothesis:
     """The file's camera for this photo.
+
+    Args:
+        path: the file, or only its name where `data` is given.
+        photo: the picture.
+        data: the file's content where it was sent rather than named; nothing is then read from the disk.
 
     Raises:
         FileFormatError: no such file, not a camera, or a camera of another picture size.
     """
-    own = read(path)
+    own = parse(path, _bytes(path) if data is None else data)
     doubtful = own.cov is None
     found = scaled_to(_with_assumed_u(own) if doubtful else own, photo)
     if isinstance(found, str):
@@ -49,14 +54,19 @@ def _with_assumed_u(camera: Camera) -> Camera:
     return replace(camera, cov=cov, source=f"{camera.source}; u assumed", id=None)
 
 
-def read(path: Path) -> Camera:
-    """The camera in a file: the object itself, or one under "camera"."""
+def _bytes(path: Path) -> bytes:
     if not path.is_file():
         raise FileFormatError(path, "no such file")
-    if path.stat().st_size > MOST_BYTES:
+    with path.open("rb") as file:
+        return file.read(MOST_BYTES + 1)
+
+
+def parse(path: Path, content: bytes) -> Camera:
+    """The camera in a file's content: the object itself, or one under "camera"; `path` is for messages."""
+    if len(content) > MOST_BYTES:
         raise FileFormatError(path, f"is larger than {MOST_BYTES // 2**20} MiB, no calibration is")
     try:
-        data: Any = json.loads(path.read_text("utf-8"))
+        data: Any = json.loads(content.decode("utf-8"))
     except (ValueError, RecursionError):
         raise FileFormatError(
             path, "is not JSON; give a camera as `subtense camera PHOTO --format json` prints it (no YAML, XML)"

@@ -6,6 +6,7 @@ sides are fitted again (see `subpixel`). The size of a marker is that of its bla
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -29,12 +30,15 @@ WORST_MISFIT = 0.25
 """Rms residual of a side over its contrast beyond which there is no edge."""
 
 
-def markers(photo: Photo, family: str | None = None) -> tuple[Observation, ...]:
+def markers(
+    photo: Photo, family: str | None = None, progress: Callable[[float], None] = lambda share: None
+) -> tuple[Observation, ...]:
     """Markers in a photo, left to right.
 
     Args:
         photo: the picture.
         family: a key of FAMILIES, or None to try all.
+        progress: called with the share done, 0 to 1, of the longest search there can be.
 
     Returns:
         One Observation each: corners top-left, top-right, bottom-right, bottom-left of the marker as printed.
@@ -44,13 +48,17 @@ def markers(photo: Photo, family: str | None = None) -> tuple[Observation, ...]:
     gray = cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY)
     encoded = encoded_gray(photo.pixels)
     found: list[Observation] = []
-    for correction, names in _passes([family] if family else list(FAMILIES)):
+    passes = _passes([family] if family else list(FAMILIES))
+    done, most = 0, sum(len(names) for _, names in passes)
+    for correction, names in passes:
         for name in names:
             for number, corners in _detected(cv2, gray, name, correction):
                 if any(_same_place(corners, other.points_px) for other in found):
                     continue
                 seen = _located(encoded, name, number, corners)
                 found += [seen] if seen else []
+            done += 1
+            progress(done / most)
         if found:
             break
     return tuple(sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))

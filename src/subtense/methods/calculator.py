@@ -9,7 +9,7 @@ share of that which is added (0, and up to 1 as a one-sided limit, where the cla
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ..geometry import segment_depth
 from ..method import Method, Output, Reason, reasons
 from ..quantity import Note, Quantity
 
-UNKNOWNS = ("distance", "size", "extent", "focal_length")
+UNKNOWNS = ("distance", "size", "extent", "focal_length", "sensor_width", "image_width")
 """What can be left out, and is then solved for."""
 
 
@@ -37,11 +37,11 @@ def square_pixels() -> Quantity:
 
 @dataclass(frozen=True)
 class Inputs:
-    """Focal length, sensor width, image width, and all but one of distance, size, extent, focal length.
+    """All but one of focal length, sensor width, image width, size, extent and distance.
 
     Attributes:
-        sensor_width: width of the sensor, m.
-        image_width: picture width, px.
+        sensor_width: width of the sensor, m; leave it out to solve for it.
+        image_width: picture width, px; or leave it out.
         focal_length: m; leave it out to solve for it.
         size: real size of the object, m; or leave it out.
         extent: its length in the picture, px; or leave it out.
@@ -54,8 +54,8 @@ class Inputs:
         focus: share of the thin-lens extension that is added.
     """
 
-    sensor_width: Quantity = field(metadata={"unit": "m"})
-    image_width: Quantity = field(metadata={"unit": "px"})
+    sensor_width: Quantity | None = field(default=None, metadata={"unit": "m"})
+    image_width: Quantity | None = field(default=None, metadata={"unit": "px"})
     focal_length: Quantity | None = field(default=None, metadata={"unit": "m"})
     size: Quantity | None = field(default=None, metadata={"unit": "m"})
     extent: Quantity | None = field(default=None, metadata={"unit": "px"})
@@ -79,13 +79,15 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Result:
-    """Arrays (...): the five values of the relation, the solved one among them, and what lies between."""
+    """Arrays (...): the six values of the relation, the solved one among them, and what lies between."""
 
     distance_m: Array
     range_m: Array
     size_m: Array
     extent_px: Array
     focal_length_m: Array
+    sensor_width_m: Array
+    image_width_px: Array
     focal_length_px: Array
     sensor_px_per_m: Array
     object_m_per_px: Array
@@ -102,7 +104,8 @@ class _Scene:
     size: Array | None
     extent: Array | None
     distance: Array | None
-    pitch: Array  # width of a pixel on the sensor, m
+    sensor: Array | None
+    image: Array | None
     ex: float  # the extent's direction in the picture
     ey: Array
     ox: Array
@@ -112,6 +115,12 @@ class _Scene:
     tilt: Array
     focus: Array
 
+    @property
+    def pitch(self) -> Array:
+        """Width of a pixel on the sensor, m."""
+        assert self.sensor is not None and self.image is not None
+        return np.asarray(self.sensor / self.image)
+
 
 def _value(quantity: Quantity | None) -> Array | None:
     return None if quantity is None else np.asarray(quantity.value, float)
@@ -120,9 +129,9 @@ def _value(quantity: Quantity | None) -> Array | None:
 def _scene(inputs: Inputs) -> _Scene:
     aspect, tilt = np.asarray(inputs.aspect.value, float), np.asarray(inputs.tilt.value, float)
     along_width = inputs.along == "width"
-    pitch = np.asarray(inputs.sensor_width.value) / np.asarray(inputs.image_width.value)
     return _Scene(
-        _value(inputs.focal_length), _value(inputs.size), _value(inputs.extent), _value(inputs.distance), pitch,
+        _value(inputs.focal_length), _value(inputs.size), _value(inputs.extent), _value(inputs.distance),
+        _value(inputs.sensor_width), _value(inputs.image_width),
         1.0 if along_width else 0.0, np.zeros_like(aspect) if along_width else 1 / aspect,
         np.asarray(inputs.offset_x.value), np.asarray(inputs.offset_y.value) / aspect, np.sin(tilt), np.cos(tilt), tilt,
         np.asarray(inputs.focus.value),
@@ -157,19 +166,37 @@ def _extent(s: _Scene) -> Array:
     return np.asarray((np.sqrt(inner) - turn) / z * f / unit)
 
 
+def _seen_focal(s: _Scene, z: Array) -> Array:
+    """Focal length in pixels that draws the object as long as it is: f = |Z E + L sin O| / (L cos)."""
+    assert s.size is not None and s.extent is not None
+    x = z * s.ex * s.extent + s.size * s.sine * s.ox
+    y = z * s.ey * s.extent + s.size * s.sine * s.oy
+    return np.asarray(np.hypot(x, y) / (s.size * s.cosine))
+
+
 def _focal(s: _Scene) -> Array:
-    """f = |Z E + L sin O| / (L cos) with Z = D - focus f, by a fixed point that gains a factor f / D each time."""
-    assert s.size is not None and s.extent is not None and s.distance is not None
+    """Z = D - focus f holds the unknown itself: a fixed point, which gains a factor f / D each time."""
+    assert s.distance is not None
     f = np.zeros(())
     for _ in range(12):
-        z = s.distance - s.focus * f * s.pitch
-        x = z * s.ex * s.extent + s.size * s.sine * s.ox
-        y = z * s.ey * s.extent + s.size * s.sine * s.oy
-        f = np.hypot(x, y) / (s.size * s.cosine)
-    return np.asarray(f * s.pitch)
+        f = _seen_focal(s, s.distance - s.focus * f) * s.pitch
+    return np.asarray(f)
 
 
-_SOLVERS = {"distance": _distance, "size": _size, "extent": _extent, "focal_length": _focal}
+def _sensor_width(s: _Scene) -> Array:
+    assert s.focal is not None and s.distance is not None and s.image is not None
+    return np.asarray(s.focal * s.image / _seen_focal(s, s.distance - s.focus * s.focal))
+
+
+def _image_width(s: _Scene) -> Array:
+    assert s.focal is not None and s.distance is not None and s.sensor is not None
+    return np.asarray(_seen_focal(s, s.distance - s.focus * s.focal) * s.sensor / s.focal)
+
+
+_SOLVERS = {"distance": _distance, "size": _size, "extent": _extent, "focal_length": _focal,
+            "sensor_width": _sensor_width, "image_width": _image_width}  # fmt: skip
+_FIELDS = {"distance": "distance", "size": "size", "extent": "extent", "focal_length": "focal", "sensor_width": "sensor",
+           "image_width": "image"}  # fmt: skip
 
 
 def calculator(inputs: Inputs) -> Result:
@@ -177,25 +204,18 @@ def calculator(inputs: Inputs) -> Result:
 
     Source: similar triangles; see the module.
     """
-    s = _scene(inputs)
-    unknown = inputs.unknown
+    given, unknown = _scene(inputs), inputs.unknown
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        solved = _SOLVERS[unknown](s)
-        focal, size, extent, distance = (
-            solved if name == unknown else known
-            for name, known in (
-                ("focal_length", s.focal),
-                ("size", s.size),
-                ("extent", s.extent),
-                ("distance", s.distance),
-            )
-        )
+        solved = _SOLVERS[unknown](given)
+        s = replace(given, **{_FIELDS[unknown]: solved})
+        focal, size, extent, distance, sensor = s.focal, s.size, s.extent, s.distance, s.sensor
         assert focal is not None and size is not None and extent is not None and distance is not None
+        assert sensor is not None and s.image is not None
         f = focal / s.pitch
         bx, by, ax, ay = s.ox / f, s.oy / f, s.ex * extent / f, s.ey * extent / f
         step = size * s.sine / 4 / distance  # the middle of the 3-D segment: Z b + (half step) a / 2
         range_m = distance * np.sqrt(1 + (bx + step * ax) ** 2 + (by + step * ay) ** 2)
-        view = 2 * np.arctan2(np.asarray(inputs.sensor_width.value), 2 * focal)
+        view = 2 * np.arctan2(sensor, 2 * focal)
         angle = _angle(bx - ax / 2, by - ay / 2, bx + ax / 2, by + ay / 2)
         per_px = size / extent
     code = reasons(
@@ -203,7 +223,7 @@ def calculator(inputs: Inputs) -> Result:
         (~(size > 0), Reason.OUT_OF_RANGE), (~(s.pitch > 0), Reason.OUT_OF_RANGE), (extent == 0, Reason.ZERO_EXTENT),
         (~(extent > 0), Reason.OUT_OF_RANGE), (~np.isfinite(solved), Reason.TOO_OBLIQUE), (~(distance > 0), Reason.BEHIND_CAMERA),
     )  # fmt: skip
-    return Result(distance, range_m, size, extent, focal, f, 1 / s.pitch, per_px, view, angle, code)
+    return Result(distance, range_m, size, extent, focal, sensor, s.image, f, 1 / s.pitch, per_px, view, angle, code)
 
 
 def _angle(x1: Array, y1: Array, x2: Array, y2: Array) -> Array:
@@ -217,6 +237,8 @@ _TURNED = {
     "size": "its size comes out too small",
     "extent": "it looks shorter than that",
     "focal_length": "the focal length comes out too small",
+    "sensor_width": "the sensor comes out too wide",
+    "image_width": "the picture comes out too narrow",
 }
 
 
@@ -253,6 +275,8 @@ METHOD = Method(
         Output("size_m", "size", "m", "real size"),
         Output("extent_px", "extent", "px", "extent in the picture"),
         Output("focal_length_m", "focal_length", "m", "focal length"),
+        Output("sensor_width_m", "sensor_width", "m", "sensor width"),
+        Output("image_width_px", "image_width", "px", "picture width"),
         Output("focal_length_px", "focal_length_px", "px", "focal length in pixels"),
         Output("sensor_px_per_m", "sensor_scale", "px/m", "pixels per mm on the sensor"),
         Output("object_m_per_px", "object_scale", "m/px", "mm per pixel at the object"),

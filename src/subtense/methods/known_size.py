@@ -14,16 +14,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays import Array, Codes
-from ..assumptions import frontal
+from ..assumptions import frontal, unknown_tilt
 from ..camera import Camera
-from ..focus import close_focus, thin_lens
+from ..focus import NO_EXTENSION, close_focus, thin_lens
 from ..geometry import segment_depth
 from ..lenses import LENSES
 from ..method import Method, Output, Reason, reasons
 from ..observation import Observation
 from ..quantity import Note, Quantity
-
-NO_EXTENSION = Quantity.exact(0.0, "1", "the camera is calibrated")
 
 
 @dataclass(frozen=True)
@@ -39,9 +37,11 @@ class Inputs:
     """
 
     camera: Camera
-    ends: Observation
-    size: Quantity = field(metadata={"unit": "m"})
-    tilt: Quantity = field(default_factory=frontal, metadata={"unit": "rad"})
+    ends: Observation = field(metadata={"points": 2})
+    size: Quantity = field(metadata={"unit": "m", "assume": "size"})
+    tilt: Quantity = field(
+        default_factory=frontal, metadata={"unit": "rad", "assume": "angle", "in_photo": unknown_tilt}
+    )
     focus: Quantity = field(default_factory=thin_lens, metadata={"unit": "1"})
 
 

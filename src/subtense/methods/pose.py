@@ -56,7 +56,7 @@ class Inputs:
     """
 
     camera: Camera
-    points: Observation
+    points: Observation = field(metadata={"points": 4, "closed": True})
     target: Target
     focus: Quantity = field(default_factory=thin_lens, metadata={"unit": "1"})
     ambiguity: Quantity = field(default_factory=unambiguous, metadata={"unit": "1"})

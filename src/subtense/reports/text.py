@@ -19,6 +19,8 @@ TITLES = {
     "size": "real size",
     "extent": "extent in the picture",
     "focal_length": "focal length",
+    "sensor_width": "sensor width",
+    "image_width": "picture width",
     "focal_length_px": "focal length in pixels",
     "sensor_scale": "pixels per mm on the sensor",
     "object_scale": "mm per pixel at the object",

@@ -15,7 +15,10 @@ from ..quantity import Measurement, Quantity
 from .given import given
 from .improve import improved
 
-_FIELD_OF = {"distance": "distance_m", "size": "size_m", "extent": "extent_px", "focal_length": "focal_length_m"}
+_FIELD_OF = {
+    "distance": "distance_m", "size": "size_m", "extent": "extent_px", "focal_length": "focal_length_m",
+    "sensor_width": "sensor_width_m", "image_width": "image_width_px",
+}  # fmt: skip
 _ALWAYS = ("range_m", "sensor_px_per_m", "focal_length_px", "object_m_per_px", "field_of_view_rad", "angle_rad")
 
 
@@ -25,7 +28,7 @@ def calculate(
     """Solve the classical relation for the value that was left out.
 
     Args:
-        inputs: with exactly one of distance, size, extent, focal_length left as None.
+        inputs: with exactly one of distance, size, extent, focal_length, sensor_width, image_width left as None.
         image_height: px, to check an extent along the height against; None if unknown.
         level: coverage of the intervals.
         seed: of the draws, where they are needed.
@@ -40,7 +43,7 @@ def calculate(
     by_name = dict(zip((o.name for o in calculator.METHOD.outputs), found, strict=True))
     _check_answer(by_name, inputs, image_height)
     chosen = [by_name[name] for name in dict.fromkeys((_FIELD_OF[unknown], *_ALWAYS))]
-    return Document(improved(tuple(_headed(chosen))), _camera(by_name, inputs))
+    return Document(improved(tuple(_headed(chosen))), _camera(by_name))
 
 
 def _headed(measurements: list[Measurement]) -> list[Measurement]:
@@ -49,9 +52,9 @@ def _headed(measurements: list[Measurement]) -> list[Measurement]:
     return [head, *(dataclasses.replace(m, notes=()) for m in rest)]
 
 
-def _camera(found: dict[str, Measurement], inputs: calculator.Inputs) -> dict[str, Any]:
+def _camera(found: dict[str, Measurement]) -> dict[str, Any]:
     f = found["focal_length_px"]
-    return {"f_px": f.value, "u_f_px": f.u, "width_px": int(inputs.image_width.value), "height_px": None,
+    return {"f_px": f.value, "u_f_px": f.u, "width_px": round(found["image_width_px"].value), "height_px": None,
             "source": "the relation between focal length, sensor and picture"}  # fmt: skip
 
 
@@ -61,9 +64,10 @@ def _check_answer(found: dict[str, Measurement], inputs: calculator.Inputs, imag
     if distance <= focal:
         text = f"at {distance * 1000:g} mm the object lies inside the focal length of {focal * 1000:.4g} mm; no lens draws it"
         raise GeometryError(text, code="inside_focal_length")
-    limit = inputs.image_width if inputs.along == "width" else image_height
-    if limit is not None and extent > float(limit.value):
-        text = f"the object would span {extent:.0f} px, and the picture has {float(limit.value):g} px along its {inputs.along}"
+    height = None if image_height is None else float(image_height.value)
+    limit = found["image_width_px"].value if inputs.along == "width" else height
+    if limit is not None and extent > limit:
+        text = f"the object would span {extent:.0f} px, and the picture has {limit:.7g} px along its {inputs.along}"
         raise GeometryError(text, code="out_of_picture")
 
 
@@ -72,7 +76,7 @@ def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
     if len(missing) != 1:
         names = ", ".join(calculator.UNKNOWNS)
         raise InputError("the unknown", ", ".join(missing) or "nothing", f"leave out exactly one of {names}")
-    for name in (*calculator.UNKNOWNS, "sensor_width", "image_width", "aspect"):
+    for name in (*calculator.UNKNOWNS, "aspect"):
         quantity = getattr(inputs, name)
         if quantity is not None and not np.all(np.asarray(quantity.value) > 0):
             raise InputError(

@@ -48,19 +48,17 @@ def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity |
     """
     said = {name: _read(name, text.get(name)) for name in _HOW}
     preset = _preset(text.get("preset"))
+    object_side = {name: said[name] for name in ("size", "extent", "distance")}
+    asked_for_camera = all(object_side.values())
+    focal = said["focal"] or (preset.focal_length if preset and not asked_for_camera else None)
+    wants_one = asked_for_camera and focal is not None  # the unknown is the sensor's or the picture's width
     image_width = said["image_width"] or (preset.image_width if preset else None)
-    if image_width is None:
+    if image_width is None and not wants_one:
         raise InputError("--image-width", None, "give the picture's width in pixels, or a --preset of a camera class")
-    unknowns: dict[str, Any] = {
-        "focal_length": said["focal"], "size": said["size"], "extent": said["extent"], "distance": said["distance"],
-    }  # fmt: skip
-    asked_for_focal = all(unknowns[name] for name in ("size", "extent", "distance"))
-    if preset and not unknowns["focal_length"] and not asked_for_focal:
-        unknowns["focal_length"] = preset.focal_length
+    sensor_width = _sensor_width(said, preset, image_width, needed=not wants_one or image_width is None)
     optional: dict[str, Any] = {name: said[name] for name in ("aspect", "tilt") if said[name] is not None}
     optional |= _offset(text.get("offset"))
-    inputs = Inputs(_sensor_width(said, preset, image_width), image_width, **unknowns, along=text.get("along") or "width",
-                    **optional)  # fmt: skip
+    inputs = Inputs(sensor_width, image_width, focal, **object_side, along=text.get("along") or "width", **optional)
     return inputs, said["image_height"]
 
 
@@ -75,17 +73,20 @@ def _read(name: str, text: str | None) -> Quantity | None:
     return quantity
 
 
-def _sensor_width(said: Mapping[str, Quantity | None], preset: Preset | None, image_width: Quantity) -> Quantity:
+def _sensor_width(
+    said: Mapping[str, Quantity | None], preset: Preset | None, image_width: Quantity | None, *, needed: bool
+) -> Quantity | None:
     """The sensor's width, from its height or diagonal by the picture's proportions where those were said."""
     if said["sensor_width"] is not None:
         return said["sensor_width"]
     other = said["sensor_height"] or said["sensor_diagonal"]
     if other is None:
-        if preset is None:
+        if preset is None and needed:
             raise InputError("--sensor-width", None, "give it, its height or diagonal, or a --preset")
-        return preset.sensor_width
-    if said["image_height"] is None:
-        raise InputError("--image-height", None, "the sensor's width follows from its height or diagonal by it")
+        return preset.sensor_width if preset else None
+    if said["image_height"] is None or image_width is None:
+        missing = "--image-width" if image_width is None else "--image-height"
+        raise InputError(missing, None, "the sensor's width follows from its height or diagonal by it")
     aspect = float(said["aspect"].value) if said["aspect"] else 1.0
     ratio = float(image_width.value) * aspect / float(said["image_height"].value)
     return other.scaled(ratio if said["sensor_height"] else ratio / (1 + ratio * ratio) ** 0.5)

@@ -54,21 +54,36 @@ def inputs_from_json(method: Method, data: Mapping[str, Any]) -> Any:
         InputError: a field that the method does not have, or one that can't be read.
     """
     kinds = noun_types(method.inputs)
-    values: dict[str, Any] = {}
     for name, value in data.items():
+        if value is not None and not isinstance(value, Mapping) and name in kinds and issubclass(kinds[name], Noun):
+            kind = kinds[name].__name__
+            raise InputError(f"{name} in the inputs", value, f"give a {kind} as an object, as `given` has it in JSON")
+    return read_inputs(method, data)
+
+
+def read_inputs(method: Method, values: Mapping[str, Any]) -> Any:
+    """The Inputs of a method from nouns, JSON of nouns, and texts for nouns, field by field.
+
+    Raises:
+        InputError: a field that the method does not have, one that can't be read, or something missing.
+    """
+    kinds = noun_types(method.inputs)
+    units = {field.name: field.metadata.get("unit", "") for field in dataclasses.fields(method.inputs)}
+    made: dict[str, Any] = {}
+    for name, value in values.items():
         if name not in kinds:
-            raise InputError("given", name, f"{method.name} takes {', '.join(kinds)}")
+            raise InputError("inputs", name, f"{method.name} takes {', '.join(kinds)}")
         if isinstance(value, Mapping) and "$ref" in value:
-            values[name] = values.get(str(value["$ref"]).rpartition("/")[2])
+            made[name] = made.get(str(value["$ref"]).rpartition("/")[2])
         elif isinstance(value, Mapping):
-            values[name] = _noun_from_json(kinds[name], name, value)
-        elif value is not None and issubclass(kinds[name], Noun):
-            raise InputError(
-                f"{name} in the inputs", value, f"give a {kinds[name].__name__} as an object, as `given` has it in JSON"
-            )
+            made[name] = _noun_from_json(kinds[name], name, value)
+        elif isinstance(value, str) and issubclass(kinds[name], Noun):
+            made[name] = _noun_from_text(kinds[name], name, value, units[name])
+        elif value is None or isinstance(value, kinds[name]):
+            made[name] = value
         else:
-            values[name] = value
-    return _made(method, values)
+            raise InputError(name, value, f"give a {kinds[name].__name__}")
+    return _made(method, {name: value for name, value in made.items() if value is not None})
 
 
 def inputs_from_text(method: Method, texts: Mapping[str, str]) -> Any:
@@ -85,13 +100,17 @@ def inputs_from_text(method: Method, texts: Mapping[str, str]) -> Any:
         kind: Any = kinds[name]
         if text.startswith("@"):
             values[name] = _noun_from_json(kind, option, read_json(Path(text[1:])))
-        elif kind is Quantity:
-            values[name] = Quantity.parse(text, units[name], bare=NAMED.get(units[name]), name=option)
         elif issubclass(kind, Noun):
-            values[name] = kind.parse(text, name=option)
+            values[name] = _noun_from_text(kind, option, text, units[name])
         else:
             values[name] = kind(text)
     return _made(method, values)
+
+
+def _noun_from_text(kind: Any, name: str, text: str, unit: str) -> Any:
+    if kind is Quantity:
+        return Quantity.parse(text, unit, bare=NAMED.get(unit), name=name)
+    return kind.parse(text, name=name)
 
 
 def read_json(path: Path) -> Any:
@@ -120,10 +139,9 @@ def _noun_from_json(kind: Any, name: str, data: Any) -> Any:
 
 
 def _made(method: Method, values: Mapping[str, Any]) -> Any:
-    try:
-        return method.inputs(**values)
-    except TypeError:
-        needed = [f.name for f in dataclasses.fields(method.inputs)
-                  if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING]  # fmt: skip
-        missing = [name for name in needed if name not in values]
-        raise InputError("inputs", "incomplete", f"{method.name} also needs {', '.join(missing)}") from None
+    needed = [f.name for f in dataclasses.fields(method.inputs)
+              if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING]  # fmt: skip
+    missing = [name for name in needed if values.get(name) is None]
+    if missing:
+        raise InputError("inputs", "incomplete", f"{method.name} also needs {', '.join(missing)}")
+    return method.inputs(**values)

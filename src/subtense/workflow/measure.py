@@ -8,11 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import propagate
-from ..assumptions import unknown_tilt
 from ..detectors.markers import FAMILIES, markers
 from ..distribution import normal_quantile
-from ..document import Document, Shape
+from ..document import Document
 from ..errors import FileFormatError, InputError, NothingFoundError
 from ..method import Method
 from ..methods import known_size, pose
@@ -20,9 +18,9 @@ from ..observation import Observation
 from ..photo import Photo
 from ..quantity import Measurement, Note, Quantity
 from ..target import Target
-from .given import given, inputs_from_json, inputs_from_text, read_json
-from .improve import improved
-from .resolve_camera import Resolved, resolve_camera
+from .given import inputs_from_json, inputs_from_text, read_json
+from .in_photo import Item, measure_item
+from .resolve_camera import resolve_camera
 
 
 def measure_lines(
@@ -50,17 +48,11 @@ def measure_lines(
         _check_inside(photo, line)
     resolved = resolve_camera(photo, camera)
     each = list(sizes) * len(lines) if len(sizes) == 1 else list(sizes)
-    tilt = tilt or unknown_tilt()
-    found: list[Measurement] = []
+    items = []
     for number, (line, size) in enumerate(zip(lines, each, strict=True), 1):
-        inputs = known_size.Inputs(resolved.camera, line, size, tilt)
         label = line.label or (f"line {number}" if len(lines) > 1 else "")
-        found += _measured(known_size.METHOD, inputs, label, level, seed)
-    shapes = [
-        Shape(_pairs(line), False, line.label or (f"line {i}" if len(lines) > 1 else ""))
-        for i, line in enumerate(lines, 1)
-    ]
-    return _document(photo, resolved, found, shapes)
+        items.append(Item(known_size.METHOD, {"ends": line, "size": size, **({"tilt": tilt} if tilt else {})}, label))
+    return joined([measure_item(item, photo, resolved, level=level, seed=seed) for item in items])
 
 
 def measure_markers(
@@ -94,10 +86,8 @@ def measure_markers(
         raise NothingFoundError(f"{photo.path.name}: no marker found, one is needed; it must be sharp, whole, with a light border, "
                                 "and at least 15 px wide")  # fmt: skip
     target = Target.square(size, "marker")
-    found: list[Measurement] = []
-    for one in seen:
-        found += _measured(pose.METHOD, pose.Inputs(resolved.camera, one, target), one.label, level, seed)
-    return _document(photo, resolved, found, [Shape(_pairs(one), True, one.label) for one in seen])
+    items = [Item(pose.METHOD, {"points": one, "target": target}, one.label) for one in seen]
+    return joined([measure_item(item, photo, resolved, level=level, seed=seed) for item in items])
 
 
 def measure_inputs(
@@ -120,9 +110,9 @@ def measure_inputs(
         if not isinstance(data, dict):
             raise FileFormatError(file, "holds no object of inputs")
         inputs = inputs_from_json(method, data.get("given", data))
-    camera = getattr(inputs, "camera", None)
-    found = _measured(method, inputs, "", level, seed)
-    return Document(improved(tuple(found)), {**camera.to_json(), "u_f_px": camera.u_f_px} if camera else None)
+    return measure_item(
+        Item(method, {k: v for k, v in vars(inputs).items() if v is not None}), None, None, level=level, seed=seed
+    )
 
 
 def camera_document(photo: Photo, given_camera: str | None = None, *, level: float = 0.95) -> Document:
@@ -136,17 +126,14 @@ def camera_document(photo: Photo, given_camera: str | None = None, *, level: flo
     m = Measurement(
         "focal_length_px", f, camera.u_f_px, f - half, f + half, "px", resolved.chosen.source, level, notes=notes
     )
-    return _document(photo, resolved, [m], [])
+    return Document((m,), resolved.to_json(), photo.to_json(), resolved.notes)
 
 
-def _measured(method: Method, inputs: object, label: str, level: float, seed: int) -> list[Measurement]:
-    """The outputs of one thing; its notes stand with the headline."""
-    found = propagate.measure(method, inputs, level=level, seed=seed, label=label, given=given(inputs))
-    return [found[0], *(dataclasses.replace(m, notes=()) for m in found[1:])]
-
-
-def _document(photo: Photo, resolved: Resolved, found: Sequence[Measurement], shapes: Sequence[Shape]) -> Document:
-    return Document(improved(tuple(found)), resolved.to_json(), photo.to_json(), resolved.notes, tuple(shapes))
+def joined(documents: Sequence[Document]) -> Document:
+    """Documents of one photo as one."""
+    return dataclasses.replace(
+        documents[0], measurements=sum((d.measurements for d in documents), ()), shapes=sum((d.shapes for d in documents), ()),
+    )  # fmt: skip
 
 
 def _told_apart(seen: Sequence[Observation]) -> list[Observation]:
@@ -158,10 +145,6 @@ def _told_apart(seen: Sequence[Observation]) -> list[Observation]:
         again = counts[one.label] > 1
         found.append(dataclasses.replace(one, label=f"{one.label} ({counts[one.label]})") if again else one)
     return found
-
-
-def _pairs(observation: Observation) -> tuple[tuple[float, float], ...]:
-    return tuple((float(x), float(y)) for x, y in observation.points_px)
 
 
 def _check_inside(photo: Photo, line: Observation) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 
 from .. import assumptions
@@ -11,7 +10,7 @@ from ..errors import InputError
 from ..observation import Observation
 from ..photo import Photo
 from ..quantity import Quantity
-from .measure import measure_lines, measure_markers
+from .measure import joined, measure_lines, measure_markers
 
 
 def measure_document(
@@ -41,11 +40,7 @@ def measure_document(
     if marker_size is not None:
         side = read_length(marker_size, "--marker-size")
         found.append(measure_markers(photo, side, family=marker_family, camera=camera, level=level, seed=seed))
-    first, *others = found
-    return dataclasses.replace(
-        first, measurements=sum((d.measurements for d in others), first.measurements),
-        shapes=sum((d.shapes for d in others), first.shapes),
-    )  # fmt: skip
+    return joined(found)
 
 
 def read_length(text: str, name: str) -> Quantity:

@@ -29,6 +29,19 @@ AGREE_WITHIN = 2.0
 
 
 @dataclass(frozen=True)
+class SentFile:
+    """A calibration file that was sent rather than named.
+
+    Attributes:
+        name: for messages.
+        content: its bytes.
+    """
+
+    name: str
+    content: bytes
+
+
+@dataclass(frozen=True)
 class Resolved:
     """The camera, and what every source said.
 
@@ -54,12 +67,13 @@ class Resolved:
         return {**self.camera.to_json(), "u_f_px": self.camera.u_f_px, "hypotheses": said}
 
 
-def resolve_camera(photo: Photo, given: str | None = None) -> Resolved:
+def resolve_camera(photo: Photo, given: str | SentFile | None = None, *, paths: bool = True) -> Resolved:
     """The camera of a photo.
 
     Args:
         photo: the picture.
         given: what the user said: a calibration file, `f=...`, `fov=...`, or a preset; None to go by the photo alone.
+        paths: whether a text may name a file of this machine.
 
     Raises:
         UnknownCameraError: no source has a camera; it lists why, and what to give.
@@ -67,7 +81,7 @@ def resolve_camera(photo: Photo, given: str | None = None) -> Resolved:
     """
     hypotheses = [source(photo) for source in CAMERA_SOURCES.values()]
     if given is not None:
-        chosen = _given(given, photo)
+        chosen = _given(given, photo, paths=paths)
         hypotheses.insert(0, chosen)
     else:
         chosen = min(hypotheses, key=lambda h: h.relative_u)
@@ -81,9 +95,13 @@ def resolve_camera(photo: Photo, given: str | None = None) -> Resolved:
     return Resolved(camera, chosen, tuple(hypotheses), tuple(notes))
 
 
-def _given(text: str, photo: Photo) -> Hypothesis:
+def _given(text: str | SentFile, photo: Photo, *, paths: bool) -> Hypothesis:
+    if isinstance(text, SentFile):
+        return calibration_file.camera(Path(text.name), photo, text.content)
     if not text.strip():
         raise InputError("--camera", text, WHAT_TO_GIVE)
+    if not paths:
+        return typed.camera(text, photo)
     path = Path(text)
     if path.suffix.lower() in (".json", ".yaml", ".yml", ".xml", ".txt") or ("=" not in text and path.is_file()):
         return calibration_file.camera(path, photo)

@@ -1,0 +1,134 @@
+"""A length from a reference length in the same plane, each by its two ends.
+
+In a plane that faces the camera all lengths have one scale:  length = reference * pixels / reference pixels.  A plane with
+normal n = (tan a, tan b, 1), turned by a about the picture's vertical and by b about its horizontal axis, is met by the
+viewing direction r at r / (n . r) plane distances, which gives both lengths up to that distance, and their ratio without
+it. Without a camera the rays are parallel: the foreshortening is the same, the change of scale across the plane is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Array, Codes
+from ..assumptions import frontal, unknown_tilt
+from ..camera import Camera
+from ..lenses import LENSES
+from ..method import Method, Output, Reason, reasons
+from ..observation import Observation
+from ..quantity import Note, Quantity
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The two ends of a reference of known length, and the two ends of what is wanted, in one plane.
+
+    Attributes:
+        reference: two points.
+        ends: two points of what is wanted.
+        length: real length of the reference, m.
+        turn: of the plane about the picture's vertical axis, rad; positive where the right side is nearer.
+        tip: of the plane about the picture's horizontal axis, rad; positive where the lower side is nearer.
+        camera: of the upright picture; left out, the rays are taken as parallel.
+    """
+
+    reference: Observation = field(metadata={"points": 2})
+    ends: Observation = field(metadata={"points": 2})
+    length: Quantity = field(metadata={"unit": "m", "assume": "size"})
+    turn: Quantity = field(
+        default_factory=frontal, metadata={"unit": "rad", "assume": "angle", "in_photo": unknown_tilt}
+    )
+    tip: Quantity = field(
+        default_factory=frontal, metadata={"unit": "rad", "assume": "angle", "in_photo": unknown_tilt}
+    )
+    camera: Camera | None = None
+
+
+@dataclass(frozen=True)
+class Result:
+    """Arrays (...): the wanted length."""
+
+    length_m: Array
+    reason: Codes
+
+
+def same_plane(inputs: Inputs) -> Result:
+    """The wanted length, m.
+
+    Source: similar triangles in a plane; see the module.
+    """
+    p, q = np.tan(np.asarray(inputs.turn.value)), np.tan(np.asarray(inputs.tip.value))
+    known, known_facing = _length(inputs.camera, inputs.reference.points_px, p, q)
+    wanted, wanted_facing = _length(inputs.camera, inputs.ends.points_px, p, q)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        length_m = np.asarray(inputs.length.value) * wanted / known
+    perspective = np.asarray(inputs.camera is not None and not LENSES[inputs.camera.lens].perspective)
+    code = reasons(
+        length_m.shape, (perspective, Reason.NOT_PINHOLE), (~(known_facing & wanted_facing), Reason.TOO_OBLIQUE),
+        (~(np.asarray(inputs.length.value) > 0), Reason.OUT_OF_RANGE), (known == 0, Reason.ZERO_EXTENT),
+        (wanted == 0, Reason.ZERO_EXTENT), (~np.isfinite(length_m), Reason.NOT_INVERTIBLE),
+    )  # fmt: skip
+    return Result(length_m, code)
+
+
+def _length(camera: Camera | None, points_px: Array, p: Array, q: Array) -> tuple[Array, Array]:
+    """Distance of two points in the plane, in plane distances (in pixels without a camera), and whether they lie before it."""
+    p, q = p[..., None], q[..., None]
+    if camera is None:
+        x, y = points_px[..., 0], points_px[..., 1]
+        z = -(p * x + q * y)
+        facing = np.ones(np.broadcast_shapes(x.shape, z.shape)[:-1], bool)
+    else:
+        slope_x, slope_y = camera.slopes(points_px)
+        along = 1 + p * slope_x + q * slope_y
+        with np.errstate(divide="ignore", invalid="ignore"):
+            z = 1 / along
+        x, y, facing = slope_x * z, slope_y * z, np.all(~(along <= 0), axis=-1)
+    dx, dy, dz = (c[..., 1] - c[..., 0] for c in np.broadcast_arrays(x, y, z))
+    return np.asarray(np.sqrt(dx * dx + dy * dy + dz * dz)), facing
+
+
+def notes(inputs: Inputs, _: Result) -> tuple[Note, ...]:
+    """`frontal_assumption`, `unknown_tilt` and `parallel_rays`."""
+    found = []
+    if not any(float(angle.value) or float(angle.u) for angle in (inputs.turn, inputs.tip)):
+        cost = 100 * (1 / math.cos(math.radians(20)) - 1)
+        found.append(Note("frontal_assumption", "the plane is taken to face the camera; turned by 20° a length across the turn is "
+                          f"off by up to {cost:.0f} % against one along it", "state how far it may be turned"))  # fmt: skip
+    elif inputs.turn.source.startswith("assumed") or inputs.tip.source.startswith("assumed"):
+        found.append(Note("unknown_tilt", "how the plane is turned is unknown; up to 20° each way is in the interval",
+                          "hold the camera square to the plane and state it, as in 0 ± 3 deg, or lay the reference beside what "
+                          "is wanted and in its direction"))  # fmt: skip
+    if inputs.camera is None:
+        found.append(Note("parallel_rays", "without a camera the change of scale across a turned plane is not in the interval",
+                          "give the camera, or lay the reference beside what is wanted"))  # fmt: skip
+    return tuple(found)
+
+
+def example() -> Inputs:
+    """A bank card of 85.6 mm, 800 px long, beside something 1200 px long, in a plane within 5 degrees of facing the camera."""
+    camera = Camera(4000, 3000, 3000.0, 1999.5, 1499.5, cov=np.diag([30.0**2, 0, 20.0**2, 20.0**2]))
+    within = Quantity.uniform(-math.radians(5), math.radians(5), "rad")
+    return Inputs(
+        Observation(np.array([[1000.0, 1500.0], [1800.0, 1500.0]]), label="reference"),
+        Observation(np.array([[2000.0, 900.0], [2000.0, 2100.0]]), label="what is wanted"),
+        Quantity.uniform(0.08547, 0.08572, "m"), within, within, camera,
+    )  # fmt: skip
+
+
+METHOD = Method(
+    name="same_plane",
+    title="a length beside a reference in the same plane",
+    inputs=Inputs,
+    outputs=(Output("length_m", "length", "m", "length"),),
+    function=same_plane,
+    assumes=("both lie in one plane: a reference lying higher than what is measured makes it read too small",
+             "the plane is turned as stated", "the lens draws without distortion where no camera is given"),
+    source="similar triangles in a plane; R. Hartley, A. Zisserman, Multiple View Geometry, 8.1.1",
+    typical="0.3 to 1 % square to the plane, 2 to 6 % by eye",
+    example=example,
+    notes=notes,
+)  # fmt: skip

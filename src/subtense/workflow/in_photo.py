@@ -1,0 +1,155 @@
+"""Any methods in one photo, by what a page or a project file says of them, to one Document.
+
+What a person types here gets the same defaults as in `measure`; the photo's camera goes into every method that takes one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .. import assumptions, propagate
+from ..camera import Camera
+from ..document import Document, Shape
+from ..errors import InputError, SubtenseError
+from ..method import Method
+from ..observation import Observation
+from ..photo import Photo
+from ..quantity import Measurement, Note, Quantity
+from .given import NAMED, given, noun_types, read_inputs
+from .improve import improved
+from .resolve_camera import Resolved
+
+BARE = {"m": "mm", "rad": "deg"}
+"""The unit of a bare number where a face shows it beside the field."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """One thing to measure.
+
+    Attributes:
+        method: of METHODS.
+        inputs: field to JSON of its noun, or to the text a person typed.
+        label: its name.
+    """
+
+    method: Method
+    inputs: Mapping[str, Any]
+    label: str = ""
+
+
+def measure_item(
+    item: Item, photo: Photo | None, camera: Resolved | None, *, level: float = 0.95, seed: int = 0
+) -> Document:
+    """One item as a document.
+
+    Args:
+        item: what to measure.
+        photo: the picture its points lie in; None where the inputs hold all.
+        camera: of the photo; goes into a field for a camera that the inputs leave out.
+        level: coverage of the intervals.
+        seed: of the draws.
+
+    Raises:
+        InputError: a field that can't be read, or a point outside the picture.
+        GeometryError: no finite answer.
+    """
+    inputs = item_inputs(item, photo, camera)
+    found = propagate.measure(item.method, inputs, level=level, seed=seed, label=item.label, given=given(inputs))
+    headed = [found[0], *(dataclasses.replace(m, notes=()) for m in found[1:])]
+    return _document(photo, camera, _camera_of(inputs), headed, _shapes(item, inputs))
+
+
+def measure_items(
+    items: Sequence[Item], photo: Photo, camera: Resolved | None, *, level: float = 0.95, seed: int = 0
+) -> Document:
+    """All items as one document; one that has no answer becomes a note `refused`, and does not lose the others."""
+    found: list[Measurement] = []
+    shapes: list[Shape] = []
+    refused: list[Note] = []
+    for number, item in enumerate(items, 1):
+        named = dataclasses.replace(item, label=item.label or f"{item.method.name} {number}")
+        try:
+            one = measure_item(named, photo, camera, level=level, seed=seed)
+        except SubtenseError as error:
+            refused.append(Note("refused", f"{named.label}: {error}"))
+            continue
+        found += one.measurements
+        shapes += one.shapes
+    document = _document(photo, camera, None, found, shapes)
+    return dataclasses.replace(document, notes=(*document.notes, *refused))
+
+
+def item_inputs(item: Item, photo: Photo | None, camera: Resolved | None) -> Any:
+    """The method's Inputs: texts read with the defaults of a photo, the camera filled in, points inside the picture."""
+    values = dict(item.inputs)
+    for name, kind in noun_types(item.method.inputs).items():
+        if kind is Camera and camera is not None and values.get(name) is None:
+            values[name] = camera.camera
+    texts = _with_defaults(item.method, values, in_photo=photo is not None)
+    inputs = read_inputs(item.method, texts)
+    if photo is not None:
+        _check_inside(photo, inputs)
+    return inputs
+
+
+def _with_defaults(method: Method, values: Mapping[str, Any], *, in_photo: bool) -> dict[str, Any]:
+    """Quantities that were typed are read with what is assumed of their field; those left out get the photo's default."""
+    kinds = noun_types(method.inputs)
+    found = dict(values)
+    for field in dataclasses.fields(method.inputs):
+        value = found.get(field.name)
+        if isinstance(value, str) and kinds[field.name] is Quantity:
+            unit, how = field.metadata["unit"], field.metadata.get("assume")
+            assume = getattr(assumptions, how) if how else None
+            bare = BARE.get(unit) if how else NAMED.get(unit)
+            found[field.name] = Quantity.parse(value, unit, bare=bare, name=field.name, assume=assume)
+        elif value is None and in_photo and "in_photo" in field.metadata:
+            found[field.name] = field.metadata["in_photo"]()
+    return found
+
+
+def _check_inside(photo: Photo, inputs: Any) -> None:
+    limit = np.array([photo.width_px, photo.height_px]) - 0.5
+    for field in dataclasses.fields(inputs):
+        seen = getattr(inputs, field.name)
+        if isinstance(seen, Observation) and (np.any(seen.points_px < -0.5) or np.any(seen.points_px > limit)):
+            ends = ";".join(f"{x:g},{y:g}" for x, y in seen.points_px.reshape(-1, 2))
+            raise InputError(
+                field.name, ends, f"the picture has {photo.width_px} x {photo.height_px} px; all points must lie in it"
+            )
+
+
+def _camera_of(inputs: Any) -> Camera | None:
+    found = getattr(inputs, "camera", None)
+    return found if isinstance(found, Camera) else None
+
+
+def _shapes(item: Item, inputs: Any) -> list[Shape]:
+    """What to draw: each observation; the last is the one the label belongs to."""
+    fields = [f for f in dataclasses.fields(inputs) if isinstance(getattr(inputs, f.name), Observation)]
+    shapes = []
+    for field in fields:
+        points = getattr(inputs, field.name).points_px.reshape(-1, 2)
+        label = item.label if field is fields[-1] else field.name
+        pairs = tuple((float(x), float(y)) for x, y in points)
+        shapes.append(Shape(pairs, bool(field.metadata.get("closed")), label))
+    return shapes
+
+
+def _document(
+    photo: Photo | None, resolved: Resolved | None, camera: Camera | None, found: Sequence[Measurement], shapes: Sequence[Shape]
+) -> Document:  # fmt: skip
+    if resolved is not None:
+        said, notes = resolved.to_json(), resolved.notes
+    else:
+        said, notes = (
+            ({**camera.to_json(), "u_f_px": camera.u_f_px} if camera else None),
+            (photo.notes if photo else ()),
+        )
+    return Document(improved(tuple(found)), said, photo.to_json() if photo else None, notes, tuple(shapes))
