@@ -212,3 +212,14 @@ def presets(words: tuple[str, ...]) -> None:
     click.echo(
         preset_table([p for p in table().values() if all(w.lower() in f"{p.name} {p.title}".lower() for w in words)])
     )
+
+
+@main.command()
+@click.argument("words", nargs=-1)
+@click.option("--file", "extra", type=click.Path(path_type=Path), help="More of them, from a TOML file of your own.")
+def targets(words: tuple[str, ...], extra: Path | None) -> None:
+    """Things of known size: paper, cards, coins, plates, signs, balls, bodies, ..., each with its doubt."""
+    from .reports.table import target_table
+    from .targets import search
+
+    click.echo(target_table(search(words, extra)))

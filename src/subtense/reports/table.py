@@ -1,4 +1,4 @@
-"""Plain tables: presets, methods, camera hypotheses."""
+"""Plain tables: presets, targets, methods, camera hypotheses."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..presets import Preset
+    from ..targets import KnownTarget
 
 
 def columns(rows: Sequence[Sequence[str]], gap: str = "   ") -> str:
@@ -36,3 +37,9 @@ def preset_table(presets: Sequence[Preset]) -> str:
     rows += [(p.name, limits(p.sensor_width, 1e-3, "mm"), limits(p.focal_length, 1e-3, "mm"), limits(p.image_width, 1.0, "px"), p.title)
              for p in presets]  # fmt: skip
     return columns(rows)
+
+
+def target_table(targets: Sequence[KnownTarget]) -> str:
+    """Name, size with its doubt, which length it is, and title of things of known size."""
+    rows = [("name", "size", "which length", "what it is")]
+    return columns([*rows, *((t.name, t.text, t.what, t.title) for t in targets)])
