@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from .quantity import Quantity as Quantity
     from .target import Target as Target
     from .workflow.calculate import calculate as calculate
+    from .workflow.calculator_input import calculator_input as calculator_input
     from .workflow.measure import measure_lines as measure_lines
     from .workflow.measure import measure_markers as measure_markers
     from .workflow.resolve_camera import resolve_camera as resolve_camera
@@ -43,7 +44,7 @@ _HOME = {
     "InputError": "errors", "METHODS": "workflow.tables", "Measurement": "quantity", "Method": "method",
     "MissingExtraError": "errors", "NothingFoundError": "errors", "Observation": "observation", "Photo": "photo",
     "Quantity": "quantity", "SubtenseError": "errors", "Target": "target", "UnknownCameraError": "errors",
-    "calculate": "workflow.calculate", "measure_lines": "workflow.measure", "measure_markers": "workflow.measure",
+    "calculate": "workflow.calculate", "calculator_input": "workflow.calculator_input", "measure_lines": "workflow.measure", "measure_markers": "workflow.measure",
     "propagate": "propagate", "resolve_camera": "workflow.resolve_camera",
 }  # fmt: skip
 

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import __version__
-from .errors import SubtenseError
+from .errors import InputError, SubtenseError
 
 if TYPE_CHECKING:
     from .document import Document
     from .method import Method
+    from .photo import Photo
 
 
 class _Group(click.Group):
@@ -50,16 +51,24 @@ def _output_options(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         click.option("--seed", type=int, default=0, show_default=True, help="Seed of the Monte Carlo draws."),
         click.option("--level", type=float, default=0.95, show_default=True, help="Coverage of the intervals."),
+        click.option("--report", "files", multiple=True, type=click.Path(path_type=Path),
+                     help="Write it to this file too: .pdf, .csv, .json, .txt, or .png where there is a photo."),
         click.option("--format", "form", default="text", show_default=True, help="text, json or csv."),
-    ):
+    ):  # fmt: skip
         command = option(command)
     return command
 
 
-def _show(document: Document, form: str) -> None:
-    from .workflow.report_of import report_of
+def _show(document: Document, form: str, files: tuple[Path, ...] = (), photo: Photo | None = None) -> None:
+    """Write the files, then print the document: text goes to the terminal, a picture or a PDF to a pipe."""
+    from .workflow.report_of import report_of, write_report
 
-    click.echo(report_of(form)(document))
+    for file in files:
+        write_report(document, photo, file)
+    shown = report_of(form, photo=photo is not None).function(document, photo)
+    if isinstance(shown, bytes) and sys.stdout.isatty():
+        raise InputError("--format", form, f"{form} is no text for a terminal; write it to a file with --report")
+    click.echo(shown, nl=isinstance(shown, str))
 
 
 @main.command(epilog="Example: subtense calc --focal 35 --sensor-width 14.1 --image-width 4096 --size 200 --extent 150")
@@ -81,7 +90,7 @@ def _show(document: Document, form: str) -> None:
 )
 @click.option("--offset", metavar="X,Y", help="Of the object's middle from the picture's, px.  [default: 0,0]")
 @_output_options
-def calc(form: str, level: float, seed: int, **text: str | None) -> None:
+def calc(form: str, files: tuple[Path, ...], level: float, seed: int, **text: str | None) -> None:
     """Distance = size x focal length in pixels / extent in pixels; leave one value out to solve for it.
 
     Leave out --distance, --size, --extent, --focal, --sensor-width or --image-width. What is said without ± gets an
@@ -91,7 +100,7 @@ def calc(form: str, level: float, seed: int, **text: str | None) -> None:
     from .workflow.calculator_input import calculator_input
 
     inputs, image_height = calculator_input(text)
-    _show(calculate(inputs, image_height=image_height, level=level, seed=seed), form)
+    _show(calculate(inputs, image_height=image_height, level=level, seed=seed), form, files)
 
 
 @main.command()
@@ -103,7 +112,8 @@ def camera(photo: Path, camera: str | None, form: str) -> None:
     from .photo import Photo
     from .workflow.measure import camera_document
 
-    _show(camera_document(Photo.load(photo), camera), form)
+    picture = Photo.load(photo)
+    _show(camera_document(picture, camera), form, photo=picture)
 
 
 @main.command(epilog="Example: subtense measure examples/desk.jpg --marker-size '50 mm' --overlay out.png")
@@ -124,7 +134,8 @@ def camera(photo: Path, camera: str | None, form: str) -> None:
 @click.option("--overlay", type=click.Path(path_type=Path), help="Write the photo with the result drawn on it.")
 @_output_options
 def measure(photo: Path, lines: tuple[str, ...], sizes: tuple[str, ...], tilt: str | None, marker_size: str | None,
-            marker_family: str | None, camera: str | None, overlay: Path | None, form: str, level: float, seed: int) -> None:  # fmt: skip
+            marker_family: str | None, camera: str | None, overlay: Path | None, form: str, files: tuple[Path, ...],
+            level: float, seed: int) -> None:  # fmt: skip
     """Measure in PHOTO: objects of known size by their ends, or markers by themselves.
 
     Pixel (0, 0) is the centre of the top-left pixel of the upright picture.
@@ -141,7 +152,34 @@ def measure(photo: Path, lines: tuple[str, ...], sizes: tuple[str, ...], tilt: s
         from .reports.overlay import write
 
         write(document, picture, overlay)
-    _show(document, form)
+    _show(document, form, files, picture)
+
+
+@main.command(epilog="Example: subtense serve examples/desk.jpg")
+@click.argument("photos", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--host", default="127.0.0.1", show_default=True, metavar="ADDRESS",
+              help="Where to listen. One that others reach needs a password in SUBTENSE_PASSWORD.")  # fmt: skip
+@click.option("--port", type=click.IntRange(1, 65535), default=8517, show_default=True)
+@click.option("--name", "names", multiple=True, metavar="NAME", help="A further host name to answer to.")
+@click.option(
+    "--limit",
+    "limits",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Another limit on what is sent, as upload_bytes=100000000.",
+)
+@click.option("--browser/--no-browser", default=True, show_default=True, help="Open the page in the browser.")
+def serve(
+    photos: tuple[Path, ...], host: str, port: int, names: tuple[str, ...], limits: tuple[str, ...], browser: bool
+) -> None:
+    """The page: the calculator, and measuring in PHOTOS. It answers to this machine only, and sends nothing anywhere."""
+    import os
+
+    from .web.serve import serve as run
+    from .web.serve import settings_for
+
+    settings = settings_for(host, port, os.environ.get("SUBTENSE_PASSWORD"), limits, names)
+    run(settings, host, photos, browser=browser, say=lambda text: click.echo(text, err=True))
 
 
 class _Methods(click.Group):
@@ -168,11 +206,12 @@ def method() -> None:
 
 
 def _method_command(found: Method) -> click.Command:
+    from .workflow.describe import field_text
     from .workflow.given import noun_types
 
     options = [
         click.Option(
-            ["--" + name.replace("_", "-")], metavar=kind.__name__.upper(), help=_attribute(found.inputs, name)
+            ["--" + name.replace("_", "-")], metavar=kind.__name__.upper(), help=field_text(found.inputs, name)
         )
         for name, kind in noun_types(found.inputs).items()
     ]
@@ -181,25 +220,17 @@ def _method_command(found: Method) -> click.Command:
     )
 
     @_output_options
-    def run(form: str, level: float, seed: int, inputs: Path | None, **texts: str | None) -> None:
+    def run(
+        form: str, files: tuple[Path, ...], level: float, seed: int, inputs: Path | None, **texts: str | None
+    ) -> None:
         from .workflow.measure import measure_inputs
 
-        _show(
-            measure_inputs(found, inputs, {k: v for k, v in texts.items() if v is not None}, level=level, seed=seed),
-            form,
-        )
+        said = {k: v for k, v in texts.items() if v is not None}
+        _show(measure_inputs(found, inputs, said, level=level, seed=seed), form, files)
 
     params = [*options, inputs, *reversed(run.__click_params__)]  # type: ignore[attr-defined]
     text = f"{found.title[0].upper()}{found.title[1:]}.\n\n{found.needs}"
     return click.Command(found.name, params=params, callback=run, help=text)
-
-
-def _attribute(inputs: type, name: str) -> str:
-    """What the Inputs' docstring says of a field."""
-    import re
-
-    match = re.search(rf"^\s*{name}: (.*?)(?=^\s*\w+: |\Z)", inputs.__doc__ or "", re.MULTILINE | re.DOTALL)
-    return " ".join(match.group(1).split()) if match else ""
 
 
 @main.command()

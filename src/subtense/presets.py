@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 from .errors import InputError
 from .quantity import Quantity
@@ -35,6 +36,21 @@ class Preset:
     image_width: Quantity | None
     aliases: tuple[str, ...]
     source: str
+
+    def to_json(self) -> dict[str, Any]:
+        """For a menu: names, source, and the limits of each number in mm or px; null where the row does not say it."""
+
+        def limits(quantity: Quantity | None, factor: float) -> list[float] | None:
+            if quantity is None:
+                return None
+            half = float(quantity.u) * math.sqrt(3)
+            return [round((float(quantity.value) + sign * half) / factor, 6) for sign in (-1, 1)]
+
+        return {
+            "name": self.name, "title": self.title, "kind": self.kind, "aliases": list(self.aliases), "source": self.source,
+            "sensor_width_mm": limits(self.sensor_width, 1e-3), "sensor_height_mm": limits(self.sensor_height, 1e-3),
+            "focal_mm": limits(self.focal_length, 1e-3), "image_width_px": limits(self.image_width, 1.0),
+        }  # fmt: skip
 
 
 @cache

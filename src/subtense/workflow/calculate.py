@@ -91,3 +91,34 @@ def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
         )
     if abs(float(inputs.tilt.value)) >= np.pi / 2:
         raise InputError("tilt", f"{np.degrees(float(inputs.tilt.value)):g}°", "give an angle between -90° and 90°")
+
+
+def curve(inputs: calculator.Inputs, *, level: float = 0.95, points: int = 49) -> dict[str, Any]:
+    """The unknown over the extent (over the distance where the extent is the unknown), with its band, for a chart.
+
+    The band is of first order in the logarithm, so that it stays above 0; near the value asked for it agrees with the
+    interval of `calculate`.
+
+    Args:
+        inputs: as for `calculate`.
+        level: coverage of the band.
+        points: how many, evenly spaced in the logarithm over a factor of 20 each way.
+    """
+    unknown = inputs.unknown
+    moved = "distance" if unknown == "extent" else "extent"
+    at = getattr(inputs, moved)
+    x = float(at.value) * np.geomspace(1 / 20, 20, points)
+    widest = float(inputs.image_width.value) if moved == "extent" and inputs.image_width is not None else np.inf
+    x = x[x <= max(widest, float(at.value))]
+    # a distance is known to so many per cent, an extent to so many pixels
+    u = float(at.u) * (x / float(at.value) if moved == "distance" else np.ones_like(x))
+    many = dataclasses.replace(inputs, **{moved: dataclasses.replace(at, value=x, u=u)})
+    found = propagate.rows(calculator.METHOD, many, level=level, threads=1)
+    row = found.names.index(_FIELD_OF[unknown])
+    value, answered = found.value[row], found.reason == 0
+    spread = np.exp(found.coverage[row] * found.u[row] / value)
+    columns = {"x": x, "value": value, "low": value / spread, "high": value * spread}
+    return {
+        "x_what": moved, "y_what": unknown, "x_unit": at.unit, "y_unit": "px" if unknown in ("extent", "image_width") else "m",
+        **{name: column[answered].tolist() for name, column in columns.items()},
+    }  # fmt: skip

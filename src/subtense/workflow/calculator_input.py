@@ -101,3 +101,25 @@ def _offset(text: str | None) -> dict[str, Quantity]:
     except ValueError:
         raise InputError("--offset", text, "give two numbers of pixels, as in '300,-120'") from None
     return {"offset_x": Quantity.exact(x, "px", "stated"), "offset_y": Quantity.exact(y, "px", "stated")}
+
+
+def as_command(text: Mapping[str, str | None]) -> str:
+    """The command line that calculates the same."""
+    import shlex
+
+    said = {name: value for name, value in text.items() if value}
+    return " ".join(
+        ["subtense calc", *(f"--{name.replace('_', '-')} {shlex.quote(value)}" for name, value in said.items())]
+    )
+
+
+def as_python(text: Mapping[str, str | None]) -> str:
+    """A program that calculates the same."""
+    said = {name: value for name, value in text.items() if value}
+    lines = "".join(f"    {name!r}: {value!r},\n" for name, value in said.items())
+    return (
+        "from subtense import calculate, calculator_input\n\n"
+        f"inputs, image_height = calculator_input({{\n{lines}}})\n"
+        "answer = calculate(inputs, image_height=image_height).measurements[0]\n"
+        'print(answer.what, answer.value, answer.unit, "95 %:", answer.low, answer.high)'
+    )

@@ -15,7 +15,7 @@ import numpy as np
 from .. import assumptions, propagate
 from ..camera import Camera
 from ..document import Document, Shape
-from ..errors import InputError, SubtenseError
+from ..errors import InputError, SubtenseError, UnknownCameraError
 from ..method import Method
 from ..observation import Observation
 from ..photo import Photo
@@ -44,14 +44,14 @@ class Item:
 
 
 def measure_item(
-    item: Item, photo: Photo | None, camera: Resolved | None, *, level: float = 0.95, seed: int = 0
+    item: Item, photo: Photo | None, camera: Resolved | UnknownCameraError | None, *, level: float = 0.95, seed: int = 0
 ) -> Document:
     """One item as a document.
 
     Args:
         item: what to measure.
         photo: the picture its points lie in; None where the inputs hold all.
-        camera: of the photo; goes into a field for a camera that the inputs leave out.
+        camera: of the photo, or why it has none; goes into a field for a camera that the inputs leave out.
         level: coverage of the intervals.
         seed: of the draws.
 
@@ -66,7 +66,7 @@ def measure_item(
 
 
 def measure_items(
-    items: Sequence[Item], photo: Photo, camera: Resolved | None, *, level: float = 0.95, seed: int = 0
+    items: Sequence[Item], photo: Photo, camera: Resolved | UnknownCameraError, *, level: float = 0.95, seed: int = 0
 ) -> Document:
     """All items as one document; one that has no answer becomes a note `refused`, and does not lose the others."""
     found: list[Measurement] = []
@@ -85,12 +85,17 @@ def measure_items(
     return dataclasses.replace(document, notes=(*document.notes, *refused))
 
 
-def item_inputs(item: Item, photo: Photo | None, camera: Resolved | None) -> Any:
+def item_inputs(item: Item, photo: Photo | None, camera: Resolved | UnknownCameraError | None) -> Any:
     """The method's Inputs: texts read with the defaults of a photo, the camera filled in, points inside the picture."""
     values = dict(item.inputs)
-    for name, kind in noun_types(item.method.inputs).items():
-        if kind is Camera and camera is not None and values.get(name) is None:
-            values[name] = camera.camera
+    kinds = noun_types(item.method.inputs)
+    for field in dataclasses.fields(item.method.inputs):
+        if kinds[field.name] is not Camera or values.get(field.name) is not None:
+            continue
+        if isinstance(camera, Resolved):
+            values[field.name] = camera.camera
+        elif camera is not None and field.default is dataclasses.MISSING:
+            raise camera
     texts = _with_defaults(item.method, values, in_photo=photo is not None)
     inputs = read_inputs(item.method, texts)
     if photo is not None:
@@ -143,9 +148,9 @@ def _shapes(item: Item, inputs: Any) -> list[Shape]:
 
 
 def _document(
-    photo: Photo | None, resolved: Resolved | None, camera: Camera | None, found: Sequence[Measurement], shapes: Sequence[Shape]
+    photo: Photo | None, resolved: Resolved | UnknownCameraError | None, camera: Camera | None, found: Sequence[Measurement], shapes: Sequence[Shape]
 ) -> Document:  # fmt: skip
-    if resolved is not None:
+    if isinstance(resolved, Resolved):
         said, notes = resolved.to_json(), resolved.notes
     else:
         said, notes = (

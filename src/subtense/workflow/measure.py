@@ -83,7 +83,7 @@ def measure_markers(
     resolved = resolve_camera(photo, camera)
     seen = _told_apart(markers(photo, family))
     if not seen:
-        raise NothingFoundError(f"{photo.path.name}: no marker found, one is needed; it must be sharp, whole, with a light border, "
+        raise NothingFoundError(f"{photo.name}: no marker found, one is needed; it must be sharp, whole, with a light border, "
                                 "and at least 15 px wide")  # fmt: skip
     target = Target.square(size, "marker")
     items = [Item(pose.METHOD, {"points": one, "target": target}, one.label) for one in seen]

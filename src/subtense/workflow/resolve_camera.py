@@ -88,7 +88,7 @@ def resolve_camera(photo: Photo, given: str | SentFile | None = None, *, paths: 
     if chosen.camera is None:
         tried = tuple((h.source, h.reason) for h in hypotheses)
         why = "; ".join(reason for _, reason in tried)
-        raise UnknownCameraError(f"{photo.path.name}: no camera ({why}); {WHAT_TO_GIVE}", tried)
+        raise UnknownCameraError(f"{photo.name}: no camera ({why}); {WHAT_TO_GIVE}", tried)
     camera, disagreement = _compared(chosen, hypotheses, widen=given is None)
     refused = tuple(n for h in hypotheses if h.camera is None for n in h.notes)
     notes = dict.fromkeys((*photo.notes, *chosen.notes, *(() if given else refused), *disagreement))

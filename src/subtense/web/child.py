@@ -1,0 +1,147 @@
+"""A limited child process: it alone decodes what strangers send, and searches in it.
+
+It has no network, a bounded address space, processor time and file size, no standard input, and an empty folder of its own.
+It prints one JSON object a line: {"progress": share}, and at last {"result": ...} or {"error": {...}}.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import platform
+import struct
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Pixels
+from ..errors import SubtenseError
+
+SPARE_BYTES = 64 * 2**20
+"""What a child may write besides pixels."""
+
+
+def main() -> None:
+    """Limit this process, do what its one argument says, print the outcome."""
+    task = json.loads(sys.argv[1])
+    limit(task["limits"])
+    try:
+        say(result=TASKS[task["do"]](task))
+    except SubtenseError as error:
+        say(error={"type": type(error).__name__, "message": str(error)})
+    except MemoryError:
+        mib = task["limits"]["memory_bytes"] // 2**20
+        say(error={"type": "FileFormatError", "message": f"{task['name']}: takes more than {mib} MiB of memory (memory_bytes) to decode; "
+                   "resize it"})  # fmt: skip
+
+
+def say(**words: Any) -> None:
+    """One line to the server."""
+    sys.stdout.write(json.dumps(words) + "\n")
+    sys.stdout.flush()
+
+
+def limit(limits: dict[str, int]) -> None:
+    """Bound this process; what an operating system does not have is left out."""
+    try:
+        import resource
+    except ImportError:  # Windows: the server's own time limit still holds
+        return
+    for name, most in (
+        ("RLIMIT_AS", limits["memory_bytes"]), ("RLIMIT_CPU", limits["cpu_s"]), ("RLIMIT_NOFILE", 64), ("RLIMIT_CORE", 0),
+        ("RLIMIT_FSIZE", limits["file_bytes"]),
+    ):  # fmt: skip
+        kind = getattr(resource, name, None)
+        if kind is not None:
+            try:
+                resource.setrlimit(kind, (most, most))
+            except (ValueError, OSError):  # macOS refuses some
+                continue
+    deny_network()
+
+
+_SOCKET_CALLS = {"x86_64": (0xC000003E, (41, 59, 322)), "aarch64": (0xC00000B7, (198, 221, 281))}
+"""Audit architecture, and the numbers of socket, execve, execveat."""
+
+
+def deny_network() -> bool:
+    """On Linux: a seccomp filter under which `socket` and `execve` fail; False where there is none."""
+    if sys.platform != "linux" or platform.machine() not in _SOCKET_CALLS:
+        return False
+    architecture, calls = _SOCKET_CALLS[platform.machine()]
+    load, equal, give = 0x20, 0x15, 0x06
+    allow, refuse = 0x7FFF0000, 0x00050001  # SECCOMP_RET_ALLOW; SECCOMP_RET_ERRNO | EPERM
+    steps = [(load, 0, 0, 4), (equal, 0, len(calls) + 2, architecture), (load, 0, 0, 0)]
+    steps += [(equal, len(calls) - i, 0, call) for i, call in enumerate(calls)]
+    steps += [(give, 0, 0, allow), (give, 0, 0, refuse)]
+    code = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *step) for step in steps))
+    program = struct.pack("HxxxxxxP", len(steps), ctypes.addressof(code))
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(38, 1, 0, 0, 0):  # PR_SET_NO_NEW_PRIVS
+        return False
+    return bool(
+        libc.prctl(22, 2, ctypes.create_string_buffer(program), 0, 0) == 0
+    )  # PR_SET_SECCOMP, SECCOMP_MODE_FILTER
+
+
+# -- what it does ------------------------------------------------------------------------------------
+
+
+def decode(task: dict[str, Any]) -> dict[str, Any]:
+    """Decode the picture `input` into `pixels.bin`: the whole picture, then each half as large, down to one tile."""
+    from ..photo import Photo
+
+    made: list[np.memmap[Any, Any]] = []
+
+    def room(height_px: int, width_px: int) -> Pixels:
+        made.append(np.memmap("pixels.bin", np.uint8, "w+", shape=(height_px, width_px, 3)))
+        return made[0]
+
+    photo = Photo.load(Path("input"), name=task["name"], most_pixels=task["limits"]["pixels"], pixels=room)
+    say(progress=0.7)
+    sizes = _pyramid(made[0], task["tile_px"])
+    made[0].flush()
+    metadata = {name: value for name, value in vars(photo.metadata).items() if value is not None}
+    return {
+        "digest": photo.digest,
+        "metadata": metadata,
+        "notes": [note.to_json() for note in photo.notes],
+        "sizes": sizes,
+    }
+
+
+def _pyramid(pixels: Pixels, tile_px: int) -> list[tuple[int, int]]:
+    """Append levels of half the size to the file; (width, height) of each, largest first."""
+    import cv2
+
+    sizes = [(pixels.shape[1], pixels.shape[0])]
+    level = pixels
+    with Path("pixels.bin").open("ab") as file:
+        while max(sizes[-1]) > tile_px:
+            width, height = ((side + 1) // 2 for side in sizes[-1])
+            level = cv2.resize(level, (width, height), interpolation=cv2.INTER_AREA)
+            file.write(level.data)
+            sizes.append((width, height))
+    return sizes
+
+
+def detect(task: dict[str, Any]) -> list[dict[str, Any]]:
+    """Search the decoded picture whose pixels are in `path`, with a row of DETECTORS."""
+    from ..photo import Metadata, Photo
+    from ..workflow.tables import DETECTORS
+
+    width, height = task["size"]
+    pixels = np.memmap(task["path"], np.uint8, "r", shape=(height, width, 3))
+    photo = Photo(pixels, Metadata(), Path(task["name"]), "")
+    seen = DETECTORS[task["detector"]].function(photo, progress=lambda share: say(progress=share))
+    return [observation.to_json() for observation in seen]
+
+
+TASKS = {"decode": decode, "detect": detect}
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    main()
