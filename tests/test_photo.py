@@ -38,6 +38,16 @@ def test_orientation_is_applied_once(tmp_path, orientation):
     assert photo.stored_size_px == ((40, 60) if orientation >= 5 else (60, 40))
 
 
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_tiff_that_pillow_turns_is_not_turned_again(tmp_path, orientation):
+    path = tmp_path / "a.tif"
+    Image.fromarray(stored_as(arrow(), orientation)).save(path, tiffinfo={0x0112: orientation})
+    photo = Photo.load(path)
+    assert (photo.pixels == arrow()).all()
+    assert photo.metadata.orientation == orientation
+    assert photo.stored_size_px == ((40, 60) if orientation >= 5 else (60, 40))
+
+
 def test_an_invalid_orientation_is_told(tmp_path):
     exif = Image.Exif()
     exif[0x0112] = 9
@@ -88,7 +98,8 @@ def broken(tmp_path):
     files = {
         "empty.jpg": b"", "cut.jpg": data[: len(data) // 2], "head.jpg": data[:30], "page.pdf": b"%PDF-1.7\n...",
         "text.jpg": b"hello", "a.gif": b"GIF89a....",
-        "a.heic": b"\0\0\0\x18ftypheic" + b"\0" * 40, "a.png": b"\x89PNG\r\n\x1a\n" + b"x" * 50,
+        "a.mp4": b"\0\0\0\x18ftypisom" + b"\0" * 40, "a.avif": b"\0\0\0\x18ftypavif" + b"\0" * 40,
+        "a.png": b"\x89PNG\r\n\x1a\n" + b"x" * 50,
     }  # fmt: skip
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)
@@ -100,7 +111,8 @@ def broken(tmp_path):
     ("name", "says"),
     [
         ("empty.jpg", "empty"), ("cut.jpg", "cut or damaged"), ("head.jpg", "damaged"), ("page.pdf", "PDF"), ("text.jpg", "not a picture"),
-        ("a.gif", "GIF"), ("a.heic", "HEIC"), ("a.png", "damaged"), ("folder", "folder"), ("missing.jpg", "no such file"),
+        ("a.gif", "GIF"), ("a.mp4", "film"), ("a.avif", "AVIF"), ("a.png", "damaged"),
+        ("folder", "folder"), ("missing.jpg", "no such file"),
     ],
 )  # fmt: skip
 def test_broken_files_are_named_with_their_reason(broken, name, says):
@@ -129,6 +141,22 @@ def test_metadata_is_read_tag_by_tag(tmp_path):
     assert (tags.make, tags.model, tags.focal_mm, tags.f35_mm) == ("Maker", "Model X", 3.5, 26.0)
     assert tags.focal_plane_x_per_mm == pytest.approx(100.0)
     assert tags.digital_zoom is None
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [("desk.jpg", "desk.jpg"), ("C:\\x\\desk.jpg", "desk.jpg"), ("../de\nsk.jpg", "de sk.jpg"), ("/", "0.bin")],
+)
+def test_a_given_name_is_shown_in_results_and_errors(tmp_path, given, shown):
+    path = tmp_path / "0.bin"
+    Image.fromarray(arrow()).save(path, "PNG")
+    photo = Photo.load(path, name=given)
+    assert photo.name == photo.to_json()["name"] == shown
+    assert photo.path == path
+    path.write_bytes(b"hello")
+    with pytest.raises(FileFormatError) as caught:
+        Photo.load(path, name=given)
+    assert str(caught.value).startswith(f"{shown}: is not a picture")
 
 
 def test_output_has_no_path_and_no_position(tmp_path):

@@ -6,28 +6,20 @@ Positions and serial numbers in a file are never read.
 from __future__ import annotations
 
 import hashlib
-import io
 import math
-import threading
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from .arrays import Pixels
+from .decode import Buffer, open_picture, upright
 from .errors import FileFormatError
 from .quantity import Note
 
 MOST_PIXELS = 250_000_000
 MOST_BYTES = 512 * 2**20
-MOST_EXIF_BYTES = 2**20
-FORMATS = ("JPEG", "PNG", "TIFF", "WEBP", "BMP")
-TURNS = {1: 0, 3: 2, 6: 1, 8: 3}
-"""EXIF orientation: clockwise quarter turns that make the stored picture upright (2, 4, 5, 7 are also mirrored)."""
+MARGINS = 0.02
+"""A RAW is developed with the sensor's margins, so it is by up to that larger than the size in its tags."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +37,7 @@ class Metadata:
         tagged_width_px: stored width by the EXIF tags.
         tagged_height_px: stored height by the EXIF tags.
         digital_zoom: ratio; 1 for none.
-        orientation: 1 to 8.
+        orientation: 1 to 8: from the frame that the other tags are in to the upright picture, whoever applied it.
     """
 
     make: str | None = None
@@ -71,6 +63,7 @@ class Photo:
         path: the file.
         digest: SHA-256 of the file.
         notes: doubts about the file.
+        name: what the picture is called where people see it; the file's name unless another is given.
     """
 
     pixels: Pixels
@@ -78,6 +71,11 @@ class Photo:
     path: Path
     digest: str
     notes: tuple[Note, ...] = ()
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", self.path.name)
 
     @property
     def width_px(self) -> int:
@@ -97,130 +95,87 @@ class Photo:
 
     def to_json(self) -> dict[str, Any]:
         """Name, size and digest: no path, no position, no serial number."""
-        return {"name": self.path.name, "width_px": self.width_px, "height_px": self.height_px, "sha256": self.digest}
+        return {"name": self.name, "width_px": self.width_px, "height_px": self.height_px, "sha256": self.digest}
 
     @classmethod
-    def load(cls, path: str | Path) -> Photo:
-        """Read a picture.
+    def load(cls, path: str | Path, *, name: str | None = None, pixels: Buffer | None = None,
+             most_pixels: int = MOST_PIXELS) -> Photo:  # fmt: skip
+        """Read a picture: JPEG, PNG, TIFF, WebP, BMP, AVIF; HEIC with the extra `heic`, a camera's RAW with the extra `raw`.
+
+        Args:
+            path: the file.
+            name: what it is called in results and errors, where the file is kept under another name.
+            pixels: gives the array to decode into, from height and width in px of the upright picture: writable, uint8,
+                (height, width, 3). A `numpy.memmap`, say, so that another process has the pixels.
+            most_pixels: more are refused.
 
         Raises:
             FileFormatError: no such file, a folder, no picture, a cut picture, or one over the limits.
+            MissingExtraError: a HEIC or RAW picture, and its decoder is not installed.
+            InputError: `pixels` gave another kind of array.
         """
         path = Path(path)
-        data = _bytes(path)
-        with _pillow_without_its_own_limit() as Image:
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore")
-                    picture = Image.open(io.BytesIO(data), formats=FORMATS)
-            except Exception:
-                raise FileFormatError(path, _what_it_is(data)) from None
-            width, height = picture.size
-            if width * height > MOST_PIXELS:
-                raise FileFormatError(path, f"{width} x {height} px are {width * height / 1e6:.0f} million; the limit is "
-                                      f"{MOST_PIXELS // 10**6} million, so resize it")  # fmt: skip
-            metadata, notes = _metadata(picture)
-            pixels = _upright(_decoded(picture, path), metadata.orientation)
-        return cls(np.ascontiguousarray(pixels), metadata, path, hashlib.sha256(data).hexdigest(), notes)
+        shown = _shown(name) or path.name
+        label: object = path if name is None else shown
+        data = _bytes(path, label)
+        opened = open_picture(data, label, Path(name or path).suffix)
+        _check_size(label, opened.width_px, opened.height_px, most_pixels)
+        metadata, notes = _metadata(opened.tags(), told=opened.form == "")
+        decoded = opened.decode()
+        _check_size(label, decoded.width_px, decoded.height_px, most_pixels)  # a container may hold another size than it tells
+        array = upright(decoded, label, pixels)
+        photo = cls(array, metadata, path, hashlib.sha256(data).hexdigest(), notes, shown)
+        return replace(photo, metadata=_without_margins(photo)) if opened.form == "RAW" else photo
 
 
-def _bytes(path: Path) -> bytes:
+def _shown(name: str | None) -> str:
+    """The last part of a name, on one line: it may be a stranger's."""
+    return _text((name or "").replace("\\", "/").rsplit("/", 1)[-1]) or ""
+
+
+def _check_size(label: object, width_px: int, height_px: int, most_pixels: int) -> None:
+    if width_px * height_px > most_pixels:
+        raise FileFormatError(label, f"{width_px} x {height_px} px are {width_px * height_px / 1e6:.0f} million; the limit is "
+                              f"{most_pixels // 10**6} million, so resize it")  # fmt: skip
+
+
+def _bytes(path: Path, label: object) -> bytes:
     if not path.exists():
-        raise FileFormatError(path, "no such file")
+        raise FileFormatError(label, "no such file")
     if path.is_dir():
-        raise FileFormatError(path, "is a folder; name a picture in it")
+        raise FileFormatError(label, "is a folder; name a picture in it")
     if not path.is_file():
-        raise FileFormatError(path, "is not a file")
+        raise FileFormatError(label, "is not a file")
     if path.stat().st_size > MOST_BYTES:
-        raise FileFormatError(path, f"is larger than {MOST_BYTES // 2**20} MiB")
+        raise FileFormatError(label, f"is larger than {MOST_BYTES // 2**20} MiB")
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise FileFormatError(path, f"can't be read ({error.strerror})") from None
+        raise FileFormatError(label, f"can't be read ({error.strerror})") from None
     if not data:
-        raise FileFormatError(path, "is empty")
+        raise FileFormatError(label, "is empty")
     return data
-
-
-_SIGNATURES = (
-    (b"%PDF", "is a PDF; export the page as PNG or JPEG"), (b"GIF8", "is a GIF; save it as PNG"),
-    (b"PK\x03\x04", "is an archive; unpack it"), (b"RIFF", "is a damaged or unknown RIFF file"),
-    (b"\xff\xd8", "is a damaged JPEG"), (b"\x89PNG", "is a damaged PNG"), (b"<svg", "is an SVG; export it as PNG"),
-)  # fmt: skip
-
-
-def _what_it_is(data: bytes) -> str:
-    for signature, text in _SIGNATURES:
-        if data.startswith(signature):
-            return text
-    if data[4:12] in (b"ftypheic", b"ftypheix", b"ftypmif1", b"ftypavif"):
-        return "is a HEIC or AVIF picture; save it as JPEG"
-    return f"is not a picture that can be read; give one of {', '.join(FORMATS)}"
-
-
-_PILLOW = threading.Lock()
-
-
-@contextmanager
-def _pillow_without_its_own_limit() -> Iterator[Any]:
-    """Pillow with our limit on pixels in place of its own; its limit is a global, so it is put back."""
-    from PIL import Image
-
-    with _PILLOW:
-        own, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
-        try:
-            yield Image
-        finally:
-            Image.MAX_IMAGE_PIXELS = own
-
-
-def _decoded(picture: Any, path: Path) -> Pixels:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            picture.load()
-            if picture.mode.startswith("I"):  # 16 bits a sample
-                wide = np.asarray(picture, np.int64)
-                return np.repeat((wide >> 8).clip(0, 255).astype(np.uint8)[..., None], 3, axis=2)
-            if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
-                from PIL import Image
-
-                picture = picture.convert("RGBA")
-                picture = Image.alpha_composite(Image.new("RGBA", picture.size, "white"), picture)
-            return np.asarray(picture.convert("RGB"))
-    except Exception as error:  # a decoder raises what it likes on a stranger's file
-        reason = " ".join(str(error).split())[:80]
-        raise FileFormatError(path, f"is cut or damaged ({reason}); copy it again from the camera") from None
-
-
-def _upright(pixels: Pixels, orientation: int) -> Pixels:
-    """EXIF orientation: 2 mirrored, 3 half turn, 4 mirrored top to bottom, 5 to 8 with a quarter turn."""
-    if orientation in (2, 5, 7, 4):
-        mirrored = pixels[:, ::-1]
-        return {2: mirrored, 4: np.rot90(mirrored, 2), 5: np.rot90(mirrored, 1), 7: np.rot90(mirrored, -1)}[orientation]
-    return np.rot90(pixels, -TURNS[orientation])
 
 
 # -- metadata --------------------------------------------------------------------------------------------
 
 
-def _metadata(picture: Any) -> tuple[Metadata, tuple[Note, ...]]:
-    """The tags, each on its own: one damaged value does not hide the others."""
-    damaged = Note("metadata_damaged", "the file's metadata can't be read", "give the camera with --camera")
-    if len(picture.info.get("exif", b"")) > MOST_EXIF_BYTES:
-        return Metadata(), (damaged,)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            exif = picture.getexif()
-            tags = {**exif, **exif.get_ifd(0x8769)}
-    except Exception:  # metadata readers raise undocumented exceptions
-        return Metadata(), (damaged,)
+def _metadata(tags: dict[int, Any] | None, told: bool) -> tuple[Metadata, tuple[Note, ...]]:
+    """The tags, each on its own: one damaged value does not hide the others.
+
+    Args:
+        tags: by number; None where they are damaged.
+        told: whether the orientation tag turns the picture, so that an invalid one matters.
+    """
+    if tags is None:
+        return Metadata(), (
+            Note("metadata_damaged", "the file's metadata can't be read", "give the camera with --camera"),
+        )
     orientation = tags.get(0x0112, 1)
     notes: tuple[Note, ...] = ()
     if orientation not in range(1, 9):
         notes = (Note("orientation_invalid", f"the orientation tag is {str(orientation)[:20]!r}, not 1 to 8; the picture is "
-                      "taken as it is stored", "check that it is upright"),)  # fmt: skip
+                      "taken as it is stored", "check that it is upright"),) if told else ()  # fmt: skip
         orientation = 1
     per_mm = {2: 1 / 25.4, 3: 0.1, 4: 1.0, 5: 1000.0}.get(tags.get(0xA210, 2))
     return Metadata(
@@ -230,6 +185,16 @@ def _metadata(picture: Any) -> tuple[Metadata, tuple[Note, ...]]:
         tagged_width_px=_whole(tags.get(0xA002)), tagged_height_px=_whole(tags.get(0xA003)),
         digital_zoom=_positive(tags.get(0xA404)), orientation=int(orientation),
     ), notes  # fmt: skip
+
+
+def _without_margins(photo: Photo) -> Metadata:
+    """The metadata of a RAW without a tagged size that differs by margins only: the picture is neither resized nor cropped."""
+    tags = photo.metadata
+    if not tags.tagged_width_px or not tags.tagged_height_px:
+        return tags
+    then, now = sorted((tags.tagged_width_px, tags.tagged_height_px)), sorted(photo.stored_size_px)
+    near = all(abs(now[i] / then[i] - 1) < MARGINS for i in range(2))
+    return replace(tags, tagged_width_px=None, tagged_height_px=None) if near else tags
 
 
 def _text(value: Any) -> str | None:
