@@ -262,7 +262,7 @@ def test_camera_sources() -> None:
 def note_codes() -> set[str]:
     source = "\n".join(path.read_text("utf-8") for path in sorted((ROOT / "src").rglob("*.py")))
     codes = re.findall(r"\bNote\(\s*\"(\w+)\"", source)
-    calls = re.findall(r"\bNote\((?!code)", source)
+    calls = re.findall(r"\bNote\((?!code|\*\*)", source)  # `Note(**data)` brings back one that was made elsewhere
     assert len(codes) == len(calls) > 10, "a Note whose code is not a plain text can't be listed"
     return set(codes)
 
