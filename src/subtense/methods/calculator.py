@@ -10,6 +10,7 @@ share of that which is added (0, and up to 1 as a one-sided limit, where the cla
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -207,7 +208,8 @@ def calculator(inputs: Inputs) -> Result:
     given, unknown = _scene(inputs), inputs.unknown
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         solved = _SOLVERS[unknown](given)
-        s = replace(given, **{_FIELDS[unknown]: solved})
+        changed: dict[str, Any] = {_FIELDS[unknown]: solved}
+        s = replace(given, **changed)
         focal, size, extent, distance, sensor = s.focal, s.size, s.extent, s.distance, s.sensor
         assert focal is not None and size is not None and extent is not None and distance is not None
         assert sensor is not None and s.image is not None

@@ -68,11 +68,11 @@ def known_distance(inputs: Inputs) -> Result:
         depth_m = distance / slant
         size_m = (depth_m - np.asarray(inputs.focus.value) * (inputs.camera.nominal_focal_m or 0.0)) / per_length
     perspective = np.asarray(not LENSES[inputs.camera.lens].perspective)
-    nowhere = ~np.isfinite(x).all(axis=-1)
+    nowhere = np.asarray(~np.isfinite(x).all(axis=-1))
     size_m, depth_m = np.broadcast_arrays(size_m, depth_m)
     code = reasons(
         size_m.shape, (perspective, Reason.NOT_PINHOLE), (nowhere, Reason.NOT_INVERTIBLE),
-        ((ax == 0) & (ay == 0), Reason.ZERO_EXTENT), (~(distance > 0), Reason.OUT_OF_RANGE),
+        ((ax == 0) & (ay == 0), Reason.ZERO_EXTENT), (~(distance > 0), Reason.BEHIND_CAMERA),
         (~np.isfinite(size_m), Reason.TOO_OBLIQUE), (~(size_m > 0), Reason.BEHIND_CAMERA),
     )  # fmt: skip
     return Result(size_m, depth_m, code)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays import Array, Codes
+from ..arrays import Array, Bools, Codes
 from ..assumptions import frontal, unknown_tilt
 from ..camera import Camera
 from ..lenses import LENSES
@@ -74,7 +74,7 @@ def same_plane(inputs: Inputs) -> Result:
     return Result(length_m, code)
 
 
-def _length(camera: Camera | None, points_px: Array, p: Array, q: Array) -> tuple[Array, Array]:
+def _length(camera: Camera | None, points_px: Array, p: Array, q: Array) -> tuple[Array, Bools]:
     """Distance of two points in the plane, in plane distances (in pixels without a camera), and whether they lie before it."""
     p, q = p[..., None], q[..., None]
     if camera is None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import asyncio
 import sys
 import time
-import traceback
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from urllib.parse import parse_qs
@@ -24,7 +23,7 @@ from .children import BusyError, Children
 from .jobs import Jobs
 from .photos import Photos, sweeping
 from .problems import AbsentError, LimitError, problem_of
-from .security import Guard, problem, same, welcomed
+from .security import HEADERS, Guard, problem, same, welcomed
 from .settings import Settings
 from .state import State
 
@@ -45,7 +44,7 @@ def create_app(settings: Settings, photos: tuple[Path, ...] = ()) -> FastAPI:
     state = State(settings, children, Photos(settings.limits, children), Jobs())
 
     @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         sweeper = asyncio.create_task(sweeping(state.photos))
         try:
             for path in photos:
@@ -85,20 +84,27 @@ def _handle_errors(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     async def invalid(_: Request, error: RequestValidationError) -> Response:
         first = error.errors()[0]
-        place = ".".join(str(word) for word in first["loc"][1:])
+        place = _place(first["loc"])
         if first["type"] == "json_invalid":
             return problem(400, "body", "the body is not JSON")
         return problem(422, place or "body", f"{place or 'the body'}: {first['msg']}"[:500], "InputError")
 
     @app.exception_handler(HTTPException)
     async def http(_: Request, error: HTTPException) -> Response:
-        return problem(error.status_code, "request", str(error.detail), "Refused")
+        headers = {name.replace("-", "_"): value for name, value in (error.headers or {}).items()}
+        return problem(error.status_code, "request", str(error.detail), "Refused", **headers)
 
     @app.exception_handler(Exception)
     async def unexpected(_: Request, error: Exception) -> Response:
-        traceback.print_exception(error, file=sys.stderr)
+        """Answers from outside the guard, so with its headers; uvicorn prints the traceback."""
         status, found = problem_of(error)
-        return JSONResponse({"error": found}, status)
+        return JSONResponse({"error": found}, status, HEADERS)
+
+
+def _place(words: Sequence[int | str]) -> str:
+    """The field that a validation error is about, without the arms of a union behind it."""
+    inner = [str(word) for word in words[1:]]
+    return ".".join(inner[: inner.index("camera") + 1] if "camera" in inner else inner)
 
 
 def _add_login(app: FastAPI, settings: Settings) -> None:

@@ -31,11 +31,17 @@ def main() -> None:
     try:
         say(result=TASKS[task["do"]](task))
     except SubtenseError as error:
-        say(error={"type": type(error).__name__, "message": str(error)})
-    except MemoryError:
-        mib = task["limits"]["memory_bytes"] // 2**20
-        say(error={"type": "FileFormatError", "message": f"{task['name']}: takes more than {mib} MiB of memory (memory_bytes) to decode; "
-                   "resize it"})  # fmt: skip
+        say(error=fault(error, task["limits"]))
+
+
+def fault(error: SubtenseError, limits: dict[str, int]) -> dict[str, Any]:
+    """The error, and which limit it is about, if one."""
+    name, text = None, str(error)
+    if isinstance(error.__context__, MemoryError):
+        name, text = "memory_bytes", f"{text}; {limits['memory_bytes'] // 2**20} MiB are allowed (memory_bytes)"
+    elif "million; the limit is" in text:
+        name, text = "pixels", f"{text} (pixels)"
+    return {"type": type(error).__name__, "message": text, "name": name}
 
 
 def say(**words: Any) -> None:

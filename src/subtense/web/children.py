@@ -16,6 +16,20 @@ from ..errors import SubtenseError
 from .settings import Limits
 
 
+_NO_MEMORY = (
+    "memoryerror",
+    "failed to allocate",
+    "cannot allocate memory",
+    "failed to map segment",
+    "insufficient memory",
+)
+"""What a child complains that got too little."""
+
+
+def unwatched(_: float) -> None:
+    """Progress that nobody looks at."""
+
+
 class BusyError(Exception):
     """Too many are waiting already."""
 
@@ -25,10 +39,11 @@ class ChildError(SubtenseError):
 
     Attributes:
         kind: the name of the exception it stands for.
+        limit: the name of the limit it went over, if it did.
     """
 
-    def __init__(self, kind: str, message: str) -> None:
-        self.kind = kind
+    def __init__(self, kind: str, message: str, limit: str | None = None) -> None:
+        self.kind, self.limit = kind, limit
         super().__init__(message)
 
 
@@ -65,7 +80,7 @@ class Children:
 
     async def run(
         self, task: dict[str, Any], folder: Path, *, cpu_s: float, wall_s: float, file_bytes: int, memory_bytes: int,
-        progress: Callable[[float], None] = lambda share: None,
+        progress: Callable[[float], None] = unwatched,
     ) -> Any:  # fmt: skip
         """What a child makes of a task in a folder; it is ended when this is cancelled.
 
@@ -86,40 +101,55 @@ class Children:
             sys.executable, "-I", "-m", "subtense.web.child", text, cwd=folder, env=environment, stdin=asyncio.subprocess.DEVNULL,
             stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE, limit=2**24,
         )  # fmt: skip
+        assert process.stderr is not None
+        complaints = asyncio.create_task(_last(process.stderr))  # read all the while: a full pipe would stop the child
         try:
             async with asyncio.timeout(wall_s):
-                return await self._outcome(process, task["name"], cpu_s, memory_bytes, progress)
+                return await self._outcome(process, complaints, task["name"], cpu_s, memory_bytes, progress)
         except TimeoutError:
-            raise ChildError("FileFormatError", f"{task['name']}: took longer than {wall_s:g} s (wall_s)") from None
+            message = f"{task['name']}: took longer than {wall_s:g} s (wall_s)"
+            raise ChildError("FileFormatError", message, "wall_s") from None
         finally:
+            complaints.cancel()
             if process.returncode is None:
                 process.kill()
             await process.wait()
 
     async def _outcome(
-        self,
-        process: asyncio.subprocess.Process,
-        name: str,
-        cpu_s: float,
-        memory_bytes: int,
+        self, process: asyncio.subprocess.Process, complaints: asyncio.Task[str], name: str, cpu_s: float, memory_bytes: int,
         progress: Callable[[float], None],
-    ) -> Any:
-        assert process.stdout is not None and process.stderr is not None
+    ) -> Any:  # fmt: skip
+        assert process.stdout is not None
         async for line in process.stdout:
-            said = json.loads(line)
+            said = _said(line)
             if "progress" in said:
                 progress(float(said["progress"]))
             elif "error" in said:
-                raise ChildError(said["error"]["type"], said["error"]["message"])
+                raise ChildError(said["error"]["type"], said["error"]["message"], said["error"]["name"])
             elif "result" in said:
                 return said["result"]
-        complaint = (await process.stderr.read(4096)).decode("utf-8", "replace")
-        status = await process.wait()
+        complaint, status = await complaints, await process.wait()
         if hasattr(signal, "SIGXCPU") and status in (-signal.SIGXCPU, -signal.SIGKILL):
-            raise ChildError("FileFormatError", f"{name}: took more than {cpu_s:g} s of processor time (cpu_s)")
-        if "MemoryError" in complaint or "failed to allocate" in complaint.lower():
-            mib = memory_bytes // 2**20
-            raise ChildError(
-                "FileFormatError", f"{name}: takes more than {mib} MiB of memory (memory_bytes); resize it"
-            )
+            message = f"{name}: took more than {cpu_s:g} s of processor time (cpu_s)"
+            raise ChildError("FileFormatError", message, "cpu_s")
+        if any(words in complaint.lower() for words in _NO_MEMORY):
+            message = f"{name}: takes more than {memory_bytes // 2**20} MiB of memory (memory_bytes); resize it"
+            raise ChildError("FileFormatError", message, "memory_bytes")
         raise ChildError("FileFormatError", f"{name}: is cut or damaged; its decoder ended (status {status})")
+
+
+async def _last(stream: asyncio.StreamReader) -> str:
+    """The end of what a child complains."""
+    last = b""
+    while data := await stream.read(2**16):
+        last = (last + data)[-4096:]
+    return last.decode("utf-8", "replace")
+
+
+def _said(line: bytes) -> dict[str, Any]:
+    """A line of a child; what is none, a decoder wrote."""
+    try:
+        said = json.loads(line)
+    except ValueError:
+        return {}
+    return said if isinstance(said, dict) else {}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
+import sys
+import traceback
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -76,7 +78,10 @@ class Jobs:
         except asyncio.CancelledError:
             job.state = "cancelled"
         except Exception as error:  # whatever it was, who watches must learn that it ended
-            job.state, job.error = "failed", problem_of(error)[1]
+            status, job.error = problem_of(error)
+            job.state = "failed"
+            if status == 500:
+                traceback.print_exception(error, file=sys.stderr)
         job.tell()
 
     def cancel(self, job: Job) -> None:

@@ -1,4 +1,4 @@
-"""The bodies of requests, as the OpenAPI document shows them; the bodies of answers are in data/schema.json."""
+"""The bodies of requests, as the OpenAPI document shows them; those of answers are in answers.py."""
 
 from __future__ import annotations
 
@@ -6,8 +6,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+_ID = "c5d4c6d0ffae35b1dd6dec8353c2868e"
+"""That of examples/desk.jpg."""
 Typed = Annotated[str, Field(max_length=200)]
-PhotoId = Annotated[str, Field(pattern="^[0-9a-f]{32}$", description="from POST /api/photos", examples=["0" * 32])]
+PhotoId = Annotated[str, Field(pattern="^[0-9a-f]{32}$", description="from POST /api/photos", examples=[_ID])]
+
+
+def _shown(example: dict[str, Any]) -> ConfigDict:
+    """Nothing else is taken, and this is what one looks like."""
+    return ConfigDict(extra="forbid", json_schema_extra={"examples": [example]})
 
 
 class _Body(BaseModel):
@@ -37,8 +44,9 @@ class Calc(_Evaluated):
     tilt: Typed | None = Field(None, description="of the object to the image plane; degrees if bare")
     offset: Typed | None = Field(None, description="of its middle from the picture's, px, as in 300,-120")
 
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [
-        {"focal": "35 mm", "sensor_width": "14.1 mm", "image_width": "4096", "size": "200 mm", "extent": "150"}]})  # fmt: skip
+    model_config = _shown(
+        {"focal": "35 mm", "sensor_width": "14.1 mm", "image_width": "4096", "size": "200 mm", "extent": "150"}
+    )
 
     def texts(self) -> dict[str, str | None]:
         """The fields as the command line takes them."""
@@ -49,7 +57,7 @@ class Calibration(_Body):
     """A calibration file, sent."""
 
     name: Annotated[str, Field(max_length=255)]
-    content: Annotated[str, Field(max_length=2**20, description="the file's text")]
+    content: Annotated[str, Field(description="the file's text")]
 
 
 GivenCamera = Annotated[
@@ -66,6 +74,11 @@ class OfPhoto(_Body):
     photo: PhotoId
     camera: GivenCamera = None
 
+    model_config = _shown({"photo": _ID, "camera": "f=35mm,sensor=14.1mm"})
+
+
+_INPUTS = {"camera": "1600x1200, f=1500 ± 10 px", "ends": "120,80;640,80 ± 0.5px", "size": "200 ± 0.5 mm"}
+
 
 class Measure(_Evaluated):
     """The inputs of one method; with a photo, its camera and the defaults of `assumptions` are filled in."""
@@ -77,8 +90,7 @@ class Measure(_Evaluated):
     photo: PhotoId | None = None
     camera: GivenCamera = None
 
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"inputs": {
-        "camera": "1600x1200, f=1500 ± 10 px", "ends": "120,80;640,80 ± 0.5px", "size": "200 ± 0.5 mm"}}]})  # fmt: skip
+    model_config = _shown({"inputs": _INPUTS})
 
 
 class Item(_Body):
@@ -96,22 +108,31 @@ class Sheet(_Evaluated):
     camera: GivenCamera = None
     items: Annotated[list[Item], Field(max_length=500)] = Field(default_factory=list)
 
+    model_config = _shown({"photo": _ID, "items": [{"method": "known_size", "inputs": {
+        "ends": "120,80;640,80", "size": "200 mm"}, "label": "shelf"}]})  # fmt: skip
+
 
 class Search(_Body):
     """A detector's work."""
 
     photo: PhotoId
 
+    model_config = _shown({"photo": _ID})
+
 
 class NewJob(_Body):
     """Long work: a search in a photo."""
 
     kind: Literal["detect"] = "detect"
-    detector: Annotated[str, Field(max_length=100, examples=["markers"])]
+    detector: Annotated[str, Field(max_length=100)]
     photo: PhotoId
+
+    model_config = _shown({"kind": "detect", "detector": "markers", "photo": _ID})
 
 
 class Keep(_Body):
     """The photos a page still shows."""
 
     photos: Annotated[list[PhotoId], Field(max_length=500)]
+
+    model_config = _shown({"photos": [_ID]})

@@ -8,6 +8,7 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
+from pydantic import BaseModel
 
 PROBLEM = {
     "type": "object", "required": ["error"],
@@ -33,6 +34,11 @@ JSON = "application/json"
 def ref(name: str) -> dict[str, Any]:
     """A reference to a schema of this document."""
     return {"$ref": f"#/components/schemas/{name}"}
+
+
+def gives(model: type[BaseModel], status: int = 200) -> dict[int | str, Any]:
+    """`responses` of a route that gives JSON of this model."""
+    return {status: {"description": "the answer", "model": model}}
 
 
 def answers(schema: dict[str, Any], *, status: int = 200, more: dict[str, Any] | None = None) -> dict[int | str, Any]:

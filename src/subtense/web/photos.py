@@ -16,11 +16,13 @@ import numpy as np
 from ..arrays import Pixels
 from ..photo import Metadata, Photo
 from ..quantity import Note
-from .children import Children, ChildError
+from .children import ChildError, Children, unwatched
 from .settings import Limits
 
 TILE_PX = 512
 JPEG_QUALITY = 92
+MOST_TILES = 256
+"""Kept ready of each photo; a browser keeps those it has seen itself."""
 
 
 @dataclass
@@ -59,7 +61,7 @@ class Held:
         return {
             "id": self.id, **self.photo.to_json(), "tile_px": TILE_PX, "levels": len(self.levels),
             "tags": {name: value for name, value in tags.items() if value is not None},
-            "notes": [note.to_json() for note in self.photo.notes],
+            "notes": [note.to_json() for note in self.photo.notes], "kept": self.kept,
         }  # fmt: skip
 
 
@@ -102,7 +104,7 @@ class Photos:
                 total, count = total - held.bytes, count - 1
 
     async def add(
-        self, source: Path, name: str, *, kept: bool = False, progress: Callable[[float], None] = lambda share: None
+        self, source: Path, name: str, *, kept: bool = False, progress: Callable[[float], None] = unwatched
     ) -> Held:
         """Decode a file (it is moved into the private folder, or copied if `kept`) and hold the photo.
 
@@ -143,7 +145,7 @@ class Photos:
             levels.append(np.memmap(path, np.uint8, "r", start, (height, width, 3)))
             start += 3 * width * height
         notes = tuple(Note(**note) for note in made["notes"])
-        photo = Photo(levels[0], Metadata(**made["metadata"]), Path(name), str(made["digest"]), notes)
+        photo = Photo(levels[0], Metadata(**made["metadata"]), Path(name), str(made["digest"]), notes, name)
         return Held(photo.digest[:32], photo, tuple(levels), folder, kept, time.monotonic())
 
 
@@ -159,7 +161,7 @@ def tile(held: Held, level: int, column: int, row: int, form: str) -> bytes | No
     if not (0 <= top < pixels.shape[0] and 0 <= left < pixels.shape[1]):
         return None
     found = encoded(pixels[top : top + TILE_PX, left : left + TILE_PX], form)
-    if len(held.tiles) < 4096:
+    if len(held.tiles) < MOST_TILES:
         held.tiles[key] = found
     return found
 

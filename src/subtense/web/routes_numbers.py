@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query
 from starlette.responses import JSONResponse, Response
@@ -18,8 +18,9 @@ from ..workflow.calculate import calculate, curve
 from ..workflow.calculator_input import as_command, as_python, calculator_input
 from ..workflow.report_of import REPORTS, report_of
 from ..workflow.resolve_camera import CAMERA_SOURCES
+from .answers import Curve, Presets, Tables, Targets
 from .models import Calc
-from .openapi import answers, ref, reports
+from .openapi import answers, gives, ref, reports
 
 router = APIRouter(prefix="/api")
 Format = Annotated[
@@ -37,7 +38,7 @@ def shown(document: Document, form: str, photo: Photo | None = None, name: str =
     return Response(content, media_type=report.media_type, headers=headers)
 
 
-@router.get("/methods", summary="What can be measured, and from what", responses=answers({"type": "object"}))
+@router.get("/methods", summary="What can be measured, and from what", responses=gives(Tables))
 def get_methods() -> Response:
     """Every method with its fields, units and assumptions as JSON Schema, and the other tables of the house."""
     return JSONResponse({
@@ -48,13 +49,13 @@ def get_methods() -> Response:
     })  # fmt: skip
 
 
-@router.get("/presets", summary="Camera classes and sensors", responses=answers({"type": "object"}))
+@router.get("/presets", summary="Camera classes and sensors", responses=gives(Presets))
 def get_presets() -> Response:
     """Each with what a calculator's fields take of it: ranges are limits."""
     return JSONResponse({"presets": [p.to_json() for p in presets().values()]})
 
 
-@router.get("/targets", summary="Things of known size", responses=answers({"type": "object"}))
+@router.get("/targets", summary="Things of known size", responses=gives(Targets))
 def get_targets(q: Annotated[str, Query(max_length=100, description="words to search for")] = "") -> Response:
     """Each with its size and doubt, as text that the fields take, and its public source."""
     found = search(q.split()) if q.strip() else targets().values()
@@ -77,7 +78,7 @@ def post_calc(body: Calc, form: Format = "json") -> Response:
     return shown(calculate(inputs, image_height=image_height, level=body.level, seed=body.seed), form)
 
 
-@router.post("/calc/curve", summary="The unknown over the extent, with its band", responses=answers({"type": "object"}))
+@router.post("/calc/curve", summary="The unknown over the extent, with its band", responses=gives(Curve))
 def post_curve(body: Calc) -> Response:
     """For a chart: 49 points over a factor of 20 each way, and the interval at each."""
     inputs, image_height = calculator_input(body.texts())

@@ -17,17 +17,19 @@ from ..workflow.calculator_of import calculator_of
 from ..workflow.in_photo import Item, measure_item, measure_items
 from ..workflow.measure import camera_document
 from ..workflow.tables import DETECTORS, METHODS
+from . import answers as shapes
 from . import models
+from .children import unwatched
 from .jobs import Job, events
-from .openapi import answers, ref, reports
+from .openapi import answers, gives, ref, reports
 from .photos import Held, tile
-from .problems import AbsentError, LimitError
+from .problems import AbsentError
 from .routes_numbers import Format, shown
 from .state import camera_for, held, state_of
+from .uploads import read_form, shown_name
 
 router = APIRouter(prefix="/api")
 Id = Annotated[str, InPath(pattern="^[0-9a-f]{32}$", description="from POST /api/photos")]
-ANY: dict[str, Any] = {"type": "object"}
 _UPLOAD = {
     "requestBody": {
         "required": True,
@@ -37,47 +39,42 @@ _UPLOAD = {
 }  # fmt: skip
 
 
-@router.get("/photos", summary="The photos held", responses=answers(ANY))
+@router.get("/photos", summary="The photos held", responses=gives(shapes.Photos))
 def get_photos(request: Request) -> Response:
     """Those named on the command line stay; the others go when no page shows them."""
     photos = state_of(request).photos
-    return JSONResponse({"photos": [{**one.to_json(), "kept": one.kept} for one in photos.held.values()]})
+    return JSONResponse({"photos": [one.to_json() for one in photos.held.values()]})
 
 
 @router.post(
-    "/photos", summary="Send photos", status_code=201, responses=answers(ANY, status=201), openapi_extra=_UPLOAD
+    "/photos", summary="Send photos", status_code=201, responses=gives(shapes.Photos, 201), openapi_extra=_UPLOAD
 )
 async def post_photos(request: Request) -> Response:
     """One photo or several, each in a part named file. A photo's id follows from its content."""
-    state = state_of(request)
-    limits = state.settings.limits
-    found = []
-    async with request.form(max_files=limits.parts, max_fields=limits.parts) as form:
+    form = await read_form(request, state_of(request).settings.limits)
+    try:
         files = [part for _, part in form.multi_items() if isinstance(part, UploadFile)]
         if not files:
             raise InputError("file", None, "send the picture in a part named file, with a file name")
-        for part in files:
-            found.append((await _add(request, part)).to_json())
+        found = [(await _add(request, part)).to_json() for part in files]
+    finally:
+        await form.close()
     return JSONResponse({"photos": found}, 201)
 
 
 async def _add(request: Request, part: UploadFile) -> Held:
     state = state_of(request)
-    limits = state.settings.limits
-    if (part.size or 0) > limits.upload_bytes:
-        raise LimitError("upload_bytes", f"the file is larger than {limits.upload_bytes} bytes (upload_bytes)")
-    name = Path(part.filename or "photo").name[:200] or "photo"
     with tempfile.NamedTemporaryFile(dir=state.photos.folder, delete=False) as file:
         while data := await part.read(2**20):
             await run_in_threadpool(file.write, data)
     path = Path(file.name)
     try:
-        return await state.photos.add(path, name)
+        return await state.photos.add(path, shown_name(part.filename))
     finally:
         path.unlink(missing_ok=True)
 
 
-@router.post("/photos/keep", summary="Say which photos are still shown", responses=answers(ANY))
+@router.post("/photos/keep", summary="Say which photos are still shown", responses=gives(shapes.Absent))
 def post_keep(request: Request, body: models.Keep) -> Response:
     """A photo that is named in no request for two minutes is dropped; `absent` must be sent again to be used."""
     photos = state_of(request).photos
@@ -85,7 +82,7 @@ def post_keep(request: Request, body: models.Keep) -> Response:
     return JSONResponse({"absent": [photo for photo in body.photos if photos.find(photo) is None]})
 
 
-@router.get("/photos/{photo}", summary="A photo's size and tags", responses=answers(ANY))
+@router.get("/photos/{photo}", summary="A photo's size and tags", responses=gives(shapes.Photo))
 def get_photo(request: Request, photo: Id) -> Response:
     """No position and no serial number is ever read from it."""
     return JSONResponse(held(request, photo).to_json())
@@ -99,7 +96,8 @@ def delete_photo(request: Request, photo: Id) -> Response:
     return Response(status_code=204)
 
 
-_TILE = {200: {"description": "the tile", "content": {"image/jpeg": {}, "image/png": {}}}}
+_BYTES = {"schema": {"type": "string", "format": "binary"}}
+_TILE: dict[int | str, Any] = {200: {"description": "the tile", "content": {"image/jpeg": _BYTES, "image/png": _BYTES}}}
 Count = Annotated[int, InPath(ge=0, le=10**6)]
 
 
@@ -122,15 +120,15 @@ def get_tile(request: Request, photo: Id, level: Annotated[int, InPath(ge=0, le=
 def post_camera(request: Request, body: models.OfPhoto, form: Format = "json") -> Response:
     """As `subtense camera`: what was chosen and why, its u, and what the other sources say."""
     photo = held(request, body.photo)
-    resolved = _known(camera_for(photo, body.camera))
+    resolved = _known(camera_for(state_of(request), photo, body.camera))
     return shown(camera_document(photo.photo, resolved), form, photo.photo)
 
 
-@router.post("/camera/calculator", summary="What a photo fills into the calculator", responses=answers(ANY))
+@router.post("/camera/calculator", summary="What a photo fills into the calculator", responses=gives(shapes.Texts))
 def post_calculator(request: Request, body: models.OfPhoto) -> Response:
     """Texts for focal, sensor_width and image_width."""
     photo = held(request, body.photo)
-    return JSONResponse(calculator_of(photo.photo, _known(camera_for(photo, body.camera))))
+    return JSONResponse(calculator_of(photo.photo, _known(camera_for(state_of(request), photo, body.camera))))
 
 
 def _known(camera: Any) -> Any:
@@ -145,7 +143,9 @@ def post_sheet(request: Request, body: models.Sheet, form: Format = "json") -> R
     """An item that has no answer becomes a note `refused`, and does not lose the others."""
     photo = held(request, body.photo)
     items = [Item(_method(one.method), one.inputs, one.label) for one in body.items]
-    document = measure_items(items, photo.photo, camera_for(photo, body.camera), level=body.level, seed=body.seed)
+    document = measure_items(
+        items, photo.photo, camera_for(state_of(request), photo, body.camera), level=body.level, seed=body.seed
+    )
     return shown(document, form, photo.photo)
 
 
@@ -155,7 +155,7 @@ def post_measure(request: Request, method: Annotated[str, InPath(max_length=100)
                  form: Format = "json") -> Response:  # fmt: skip
     """Inputs as GET /api/methods describes them. With a photo its camera is filled in, and points must lie in it."""
     photo = held(request, body.photo) if body.photo else None
-    camera = camera_for(photo, body.camera) if photo else None
+    camera = camera_for(state_of(request), photo, body.camera) if photo else None
     item = Item(_method(method), body.inputs, body.label)
     document = measure_item(item, photo.photo if photo else None, camera, level=body.level, seed=body.seed)
     return shown(document, form, photo.photo if photo else None)
@@ -180,7 +180,7 @@ async def _search(request: Request, detector: str, photo: Held, job: Job | None 
     async with state.children.place():
         found: list[dict[str, Any]] = await state.children.run(
             task, photo.folder, cpu_s=limits.job_s, wall_s=limits.job_s, file_bytes=2**20, memory_bytes=2 * limits.memory_bytes,
-            progress=job.moved if job else lambda share: None,
+            progress=job.moved if job else unwatched,
         )  # fmt: skip
     return found
 
@@ -191,14 +191,14 @@ def _detector(name: str) -> str:
     return name
 
 
-@router.post("/detect/{name}", summary="Find targets in a photo", responses=answers(ANY))
+@router.post("/detect/{name}", summary="Find targets in a photo", responses=gives(shapes.Observations))
 async def post_detect(request: Request, name: Annotated[str, InPath(max_length=100)], body: models.Search) -> Response:
     """Waits for the outcome; as a job, POST /api/jobs, it tells its progress and can be cancelled."""
     photo = held(request, body.photo)
     return JSONResponse({"observations": await _search(request, _detector(name), photo)})
 
 
-@router.post("/jobs", summary="Start long work", status_code=202, responses=answers(ANY, status=202))
+@router.post("/jobs", summary="Start long work", status_code=202, responses=gives(shapes.Job, 202))
 async def post_job(request: Request, body: models.NewJob) -> Response:
     """Gives its id at once."""
     photo, name = held(request, body.photo), _detector(body.detector)
@@ -221,13 +221,18 @@ def _job(request: Request, job: str) -> Job:
     return found
 
 
-@router.get("/jobs/{job}", summary="How a job stands", responses=answers(ANY))
+@router.get("/jobs/{job}", summary="How a job stands", responses=gives(shapes.Job))
 async def get_job(request: Request, job: JobId) -> Response:
     """Its state, progress, and result or error."""
     return JSONResponse(_job(request, job).to_json())
 
 
-_EVENTS = {200: {"description": "an event each time it moves, until it ends", "content": {"text/event-stream": {}}}}
+_EVENTS: dict[int | str, Any] = {
+    200: {
+        "description": "an event each time it moves, until it ends",
+        "content": {"text/event-stream": {"schema": {"type": "string"}}},
+    }
+}
 
 
 @router.get("/jobs/{job}/events", summary="A job's progress as server-sent events", responses=_EVENTS)

@@ -26,7 +26,7 @@ HEADERS = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
     "connect-src 'self'; font-src 'self'; manifest-src 'self'; form-action 'self'; base-uri 'none'; "
     "frame-ancestors 'none'",
-    "x-content-type-options": "nosniff", "referrer-policy": "no-referrer", "cross-origin-opener-policy": "same-origin",
+    "x-content-type-options": "nosniff", "referrer-policy": "same-origin", "cross-origin-opener-policy": "same-origin",
     "cross-origin-resource-policy": "same-origin", "x-frame-options": "DENY",
     "permissions-policy": "camera=(self), geolocation=(), microphone=(), usb=(), payment=()",
 }  # fmt: skip
@@ -66,6 +66,7 @@ class Guard:
             self._wrong_host(headers)
             or self._wrong_origin(scope, headers)
             or self._stranger(scope, headers)
+            or _upgrade(headers)
             or _wrong_type(scope, headers)
         )
 
@@ -129,6 +130,16 @@ def welcomed(answer: Response, settings: Settings) -> Response:
 
 
 _HOW = "show the token: open the address that `subtense serve` printed, or send it as Authorization: Bearer"
+
+
+def _upgrade(headers: dict[str, list[str]]) -> Response | None:
+    """There is nothing to upgrade to."""
+    asked = any("websocket" in value.lower() for value in headers.get("upgrade", ()))
+    return (
+        problem(400, "upgrade", "there is no WebSocket here; jobs tell their progress by GET /api/jobs/{job}/events")
+        if asked
+        else None
+    )
 
 
 def _wrong_type(scope: Scope, headers: dict[str, list[str]]) -> Response | None:

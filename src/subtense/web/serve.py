@@ -24,14 +24,21 @@ def settings_for(
     Raises:
         InputError: a host that others reach, without a password.
     """
-    bound = Limits().changed(limits)
+    bound, names = Limits().changed(limits), tuple(name.lower() for name in names)
     if is_loopback(host):
-        return Settings(stored_token(), None, port, ("127.0.0.1", "localhost", "[::1]", *names), bound)
+        return Settings(
+            stored_token(), None, port, ("127.0.0.1", "localhost", "[::1]", _bracketed(host), *names), bound
+        )
     if not password or len(password) < 8:
         raise InputError("--host", host, "others reach this address: set a password of 8 characters or more in the environment "
                          "variable SUBTENSE_PASSWORD")  # fmt: skip
-    own = own_names() if host in ("0.0.0.0", "::") else (host,)
+    own = own_names() if host in ("0.0.0.0", "::") else (_bracketed(host),)
     return Settings(secrets.token_urlsafe(32), password, port, ("127.0.0.1", "localhost", *own, *names), bound)
+
+
+def _bracketed(host: str) -> str:
+    """A host as an address has it: IPv6 in brackets."""
+    return f"[{host.strip('[]')}]" if ":" in host else host.lower()
 
 
 def own_names() -> tuple[str, ...]:
@@ -79,7 +86,7 @@ def serve(
         if not photo.is_file():
             raise FileFormatError(photo, "no such file")
     bound = _bound(host, settings.port)
-    address = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else host}:{settings.port}/"
+    address = f"http://{'127.0.0.1' if host in ('0.0.0.0', '::') else _bracketed(host)}:{settings.port}/"
     page = address + ("measure" if photos else "")
     opened = page if settings.password else f"{page}?token={settings.token}"
     say(f"subtense is at {opened}")
@@ -90,7 +97,7 @@ def serve(
     say("photos stay on this machine; end with Ctrl+C")
     if browser:
         _open_soon(opened)
-    config = uvicorn.Config(create_app(settings, photos), log_level="warning", server_header=False, proxy_headers=False,
+    config = uvicorn.Config(create_app(settings, photos), log_level="error", server_header=False, proxy_headers=False,
                             access_log=False, timeout_graceful_shutdown=2, ws="none")  # fmt: skip
     uvicorn.Server(config).run(sockets=[bound])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from hashlib import sha256
 
 from fastapi import Request
 
@@ -12,8 +13,9 @@ from .children import Children
 from .jobs import Jobs
 from .models import Calibration
 from .photos import Held, Photos
-from .problems import AbsentError
+from .problems import AbsentError, LimitError
 from .settings import Settings
+from .uploads import shown_name
 
 
 @dataclass
@@ -44,11 +46,23 @@ def held(request: Request, photo: str) -> Held:
     return found
 
 
-def camera_for(photo: Held, given: str | Calibration | None) -> Resolved | UnknownCameraError:
-    """The photo's camera, or why there is none; a text never names a file of this machine."""
-    key = repr(given)
+def camera_for(state: State, photo: Held, given: str | Calibration | None) -> Resolved | UnknownCameraError:
+    """The photo's camera, or why there is none; a text never names a file of this machine.
+
+    Raises:
+        InputError, FileFormatError: `given` can't be used.
+        LimitError: a calibration file that is too large.
+    """
+    most = state.settings.limits.calibration_bytes
+    if isinstance(given, Calibration) and len(given.content.encode()) > most:
+        raise LimitError("calibration_bytes", f"the calibration file is larger than {most} bytes (calibration_bytes)")
+    key = sha256(repr(given).encode()).hexdigest()
     if key not in photo.cameras:
-        sent = SentFile(given.name, given.content.encode()) if isinstance(given, Calibration) else given or None
+        sent = (
+            SentFile(shown_name(given.name), given.content.encode())
+            if isinstance(given, Calibration)
+            else given or None
+        )
         try:
             found: Resolved | UnknownCameraError = resolve_camera(photo.photo, sent, paths=False)
         except UnknownCameraError as error:

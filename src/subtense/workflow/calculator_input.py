@@ -48,7 +48,7 @@ def calculator_input(text: Mapping[str, str | None]) -> tuple[Inputs, Quantity |
     """
     said = {name: _read(name, text.get(name)) for name in _HOW}
     preset = _preset(text.get("preset"))
-    object_side = {name: said[name] for name in ("size", "extent", "distance")}
+    object_side: dict[str, Any] = {name: said[name] for name in ("size", "extent", "distance")}
     asked_for_camera = all(object_side.values())
     focal = said["focal"] or (preset.focal_length if preset and not asked_for_camera else None)
     wants_one = asked_for_camera and focal is not None  # the unknown is the sensor's or the picture's width

@@ -148,13 +148,14 @@ def _shapes(item: Item, inputs: Any) -> list[Shape]:
 
 
 def _document(
-    photo: Photo | None, resolved: Resolved | UnknownCameraError | None, camera: Camera | None, found: Sequence[Measurement], shapes: Sequence[Shape]
-) -> Document:  # fmt: skip
+    photo: Photo | None,
+    resolved: Resolved | UnknownCameraError | None,
+    camera: Camera | None,
+    found: Sequence[Measurement],
+    shapes: Sequence[Shape],
+) -> Document:
+    said: dict[str, Any] | None = {**camera.to_json(), "u_f_px": camera.u_f_px} if camera else None
+    notes = photo.notes if photo else ()
     if isinstance(resolved, Resolved):
         said, notes = resolved.to_json(), resolved.notes
-    else:
-        said, notes = (
-            ({**camera.to_json(), "u_f_px": camera.u_f_px} if camera else None),
-            (photo.notes if photo else ()),
-        )
     return Document(improved(tuple(found)), said, photo.to_json() if photo else None, notes, tuple(shapes))

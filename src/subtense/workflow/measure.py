@@ -20,7 +20,7 @@ from ..quantity import Measurement, Note, Quantity
 from ..target import Target
 from .given import inputs_from_json, inputs_from_text, read_json
 from .in_photo import Item, measure_item
-from .resolve_camera import resolve_camera
+from .resolve_camera import CAMERA_SOURCES, Resolved, resolve_camera
 
 
 def measure_lines(
@@ -115,13 +115,13 @@ def measure_inputs(
     )
 
 
-def camera_document(photo: Photo, given_camera: str | None = None, *, level: float = 0.95) -> Document:
+def camera_document(photo: Photo, given_camera: str | Resolved | None = None, *, level: float = 0.95) -> Document:
     """The camera of a photo alone: its focal length in pixels, and what every source says."""
-    resolved = resolve_camera(photo, given_camera)
+    resolved = given_camera if isinstance(given_camera, Resolved) else resolve_camera(photo, given_camera)
     camera = resolved.camera
     half = normal_quantile(0.5 + level / 2) * camera.u_f_px
     f = float(camera.f_px)
-    why = "what was given" if given_camera is not None else "the smallest relative u of all sources"
+    why = "the smallest relative u of all sources" if resolved.chosen.source in CAMERA_SOURCES else "what was given"
     notes = (Note("camera_source", f"{resolved.chosen.source} was chosen: {why}"),)
     m = Measurement(
         "focal_length_px", f, camera.u_f_px, f - half, f + half, "px", resolved.chosen.source, level, notes=notes

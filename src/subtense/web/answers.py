@@ -1,0 +1,222 @@
+"""The bodies of answers, as the OpenAPI document shows them; that of a document is in data/schema.json."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Limits2 = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class _Answer(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class Output(_Answer):
+    """One number a method gives."""
+
+    what: str
+    unit: str
+    title: str
+
+
+class Method(_Answer):
+    """One row of METHODS."""
+
+    name: str
+    title: str
+    needs: str
+    assumes: list[str]
+    source: str
+    typical: str
+    outputs: list[Output]
+    inputs: dict[str, Any] = Field(
+        description="JSON Schema of `inputs` of POST /api/measure/{method}; `x-` keys are for forms"
+    )
+    example: dict[str, Any] = Field(description="inputs that can be measured")
+
+
+class Detector(_Answer):
+    """One row of DETECTORS."""
+
+    name: str
+    title: str
+    method: str = Field(description="measures what it finds")
+    field: str = Field(description="of that method, takes an observation")
+    target: str = Field(description="written before a size, the target of that method")
+    asks: str
+
+
+class Report(_Answer):
+    """One row of REPORTS."""
+
+    name: str
+    title: str
+    media_type: str
+    suffix: str
+    of_photo: bool
+
+
+class Unit(_Answer):
+    """What a unit is kept as, and how many of that it is."""
+
+    unit: str
+    factor: float
+
+
+class Tables(_Answer):
+    """The tables of the house."""
+
+    methods: list[Method]
+    detectors: list[Detector]
+    camera_sources: list[str]
+    reports: list[Report]
+    units: dict[str, Unit]
+
+
+class Preset(_Answer):
+    """A camera class or a sensor; its numbers are limits, null where the row does not say them."""
+
+    name: str
+    title: str
+    kind: Literal["class", "sensor"]
+    aliases: list[str]
+    source: str
+    sensor_width_mm: Limits2
+    sensor_height_mm: Limits2 | None
+    focal_mm: Limits2 | None
+    image_width_px: Limits2 | None
+
+
+class Presets(_Answer):
+    """All presets."""
+
+    presets: list[Preset]
+
+
+class KnownTarget(_Answer):
+    """A thing of known size; its sizes are texts as fields take them, null where its shape has none."""
+
+    name: str
+    title: str
+    group: str
+    what: str
+    shape: Literal["length", "circle", "rectangle"]
+    size: str | None
+    width: str | None
+    height: str | None
+    text: str
+    aliases: list[str]
+    doubt: str
+    source: str
+
+
+class Targets(_Answer):
+    """Those that were found."""
+
+    targets: list[KnownTarget]
+
+
+class Curve(_Answer):
+    """Columns of a chart."""
+
+    x_what: str
+    y_what: str
+    x_unit: str
+    y_unit: str
+    x: list[float]
+    value: list[float]
+    low: list[float]
+    high: list[float]
+
+
+class Texts(_Answer):
+    """What a photo fills into the calculator."""
+
+    focal: str
+    sensor_width: str
+    image_width: str
+
+
+class Tags(_Answer):
+    """What the file says of its camera; what it does not say is left out."""
+
+    make: str | None = None
+    model: str | None = None
+    lens: str | None = None
+    focal_mm: float | None = None
+    f35_mm: float | None = None
+
+
+class Doubt(_Answer):
+    """A note: a doubt and its cure."""
+
+    code: str
+    text: str
+    cure: str
+
+
+class Photo(_Answer):
+    """A photo that is held."""
+
+    id: str = Field(pattern="^[0-9a-f]{32}$")
+    name: str
+    width_px: int = Field(ge=1)
+    height_px: int = Field(ge=1)
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+    tile_px: int = Field(ge=1)
+    levels: int = Field(ge=1)
+    tags: Tags
+    notes: list[Doubt]
+    kept: bool = Field(description="whether it stays without a page")
+
+
+class Photos(_Answer):
+    """Photos."""
+
+    photos: list[Photo]
+
+
+class Absent(_Answer):
+    """Photos that must be sent again to be used."""
+
+    absent: list[str]
+
+
+class Observation(_Answer):
+    """Points seen in a picture; (0, 0) is the centre of the top-left pixel of the upright picture."""
+
+    points_px: list[Limits2]
+    sigma_px: float | list[float]
+    cov: list[list[float]] | None
+    label: str
+    score: float
+    source: str
+    id: str | None = None
+
+
+class Observations(_Answer):
+    """What a detector sees."""
+
+    observations: list[Observation]
+
+
+class Fault(_Answer):
+    """As `error` of any answer."""
+
+    type: str
+    name: str | None
+    given: Any = None
+    message: str
+
+
+class Job(_Answer):
+    """Long work, and how it stands."""
+
+    id: str = Field(pattern="^[A-Za-z0-9_-]{16}$")
+    kind: str
+    state: Literal["running", "done", "failed", "cancelled"]
+    progress: float = Field(ge=0, le=1)
+    result: Observations | None
+    error: Fault | None
