@@ -94,14 +94,18 @@ def _length(camera: Camera | None, points_px: Array, p: Array, q: Array) -> tupl
 def notes(inputs: Inputs, _: Result) -> tuple[Note, ...]:
     """`frontal_assumption`, `unknown_tilt` and `parallel_rays`."""
     found = []
-    if not any(float(angle.value) or float(angle.u) for angle in (inputs.turn, inputs.tip)):
-        cost = 100 * (1 / math.cos(math.radians(20)) - 1)
-        found.append(Note("frontal_assumption", "the plane is taken to face the camera; turned by 20° a length across the turn is "
-                          f"off by up to {cost:.0f} % against one along it", "state how far it may be turned"))  # fmt: skip
-    elif inputs.turn.source.startswith("assumed") or inputs.tip.source.startswith("assumed"):
+    angles = (inputs.turn, inputs.tip)
+    exact = [not (float(angle.value) or float(angle.u)) for angle in angles]
+    assumed = [angle.source.startswith("assumed") for angle in angles]
+    if any(a and not e for a, e in zip(assumed, exact, strict=True)):
         found.append(Note("unknown_tilt", "how the plane is turned is unknown; up to 20° each way is in the interval",
                           "hold the camera square to the plane and state it, as in 0 ± 3 deg, or lay the reference beside what "
                           "is wanted and in its direction"))  # fmt: skip
+    elif all(exact) or any(a and e for a, e in zip(assumed, exact, strict=True)):
+        cost = 100 * (1 / math.cos(math.radians(20)) - 1)
+        but = "" if all(exact) else "but for what is stated, "
+        found.append(Note("frontal_assumption", f"{but}the plane is taken to face the camera; turned by 20° a length across the turn "
+                          f"is off by up to {cost:.0f} % against one along it", "state how far it may be turned"))  # fmt: skip
     if inputs.camera is None:
         found.append(Note("parallel_rays", "without a camera the change of scale across a turned plane is not in the interval",
                           "give the camera, or lay the reference beside what is wanted"))  # fmt: skip
