@@ -50,7 +50,7 @@ def assets() -> dict[str, Asset]:
     """Path to file."""
     found = {}
     for file in sorted(FOLDER.rglob("*")) if FOLDER.is_dir() else ():
-        if file.is_file() and not file.name.startswith("."):
+        if file.is_file() and not file.is_symlink() and not file.name.startswith("."):
             found["/" + file.relative_to(FOLDER).as_posix()] = _asset(file)
     for path, name in PAGES.items():
         if f"/{name}" in found:
