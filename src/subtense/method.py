@@ -78,6 +78,7 @@ class Method:
     Attributes:
         name: the key in METHODS, as on the command line.
         title: a few words.
+        button: one or two words, for a tool that measures in a picture.
         inputs: the frozen dataclass whose fields are nouns.
         outputs: the numbers it gives, headline first.
         function: Inputs to a frozen result with an array per output and `reason`; pure, broadcasting, without sigma.
@@ -103,6 +104,7 @@ class Method:
     source: str
     typical: str
     example: Callable[[], Any]
+    button: str = ""
     prepare: Callable[[Any], Any] = field(default=lambda inputs: inputs)
     start: Callable[[Any], Any] | None = None
     derivative: Callable[[Any, Any], Mapping[str, Mapping[tuple[str, str], Partials]] | None] | None = None

@@ -12,7 +12,7 @@ from .arrays import Array
 from .distribution import NORMAL, Distribution
 from .errors import InputError
 from .noun import Noun, Part
-from .quantity import Quantity
+from .quantity import Assume, Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +69,10 @@ class Target(Noun):
         return cls(name, corners, max(float(width.u) / w, float(height.u) / h), source=width.source)
 
     @classmethod
-    def parse(cls, text: str, *, name: str = "target") -> Self:
-        """Read `square 50 ± 0.2 mm` or `rectangle 297 ± 1 mm x 210 ± 1 mm`."""
+    def parse(cls, text: str, *, name: str = "target", assume: Assume | None = None) -> Self:
+        """Read `square 50 ± 0.2 mm` or `rectangle 297 ± 1 mm x 210 ± 1 mm`; `assume` is of a side without ±."""
         shape, _, size = text.strip().partition(" ")
-        sides = [Quantity.parse(side, "m", bare="mm", name=name) for side in size.split(" x ")] if size else []
+        sides = [Quantity.parse(s, "m", bare="mm", name=name, assume=assume) for s in size.split(" x ")] if size else []
         if shape == "square" and len(sides) == 1:
             return cls.square(sides[0], "square")
         if shape == "rectangle" and len(sides) == 2:

@@ -163,6 +163,7 @@ METHOD = Method(
     source="similar triangles; thin lens: E. Hecht, Optics, 5.2",
     typical="1 to 3 % with a nominal focal length, 0.2 to 1 % calibrated",
     example=example,
+    button="Known size",
     derivative=derivative,
     prepare=prepare,
     notes=notes,

@@ -310,6 +310,7 @@ METHOD = Method(
     source="T. Collins, A. Bartoli, IJCV 2014",
     typical="0.1 to 0.5 % calibrated, 1 to 3 % with a nominal focal length",
     example=example,
+    button="Rectangle",
     start=start,
     prepare=prepare,
     most_draws=100_000,

@@ -134,5 +134,6 @@ METHOD = Method(
     source="similar triangles in a plane; R. Hartley, A. Zisserman, Multiple View Geometry, 8.1.1",
     typical="0.3 to 1 % square to the plane, 2 to 6 % by eye",
     example=example,
+    button="Same plane",
     notes=notes,
 )  # fmt: skip

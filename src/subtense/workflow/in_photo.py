@@ -20,6 +20,7 @@ from ..method import Method
 from ..observation import Observation
 from ..photo import Photo
 from ..quantity import Measurement, Note, Quantity
+from ..target import Target
 from .given import NAMED, given, noun_types, read_inputs
 from .improve import improved
 from .resolve_camera import Resolved
@@ -114,6 +115,8 @@ def _with_defaults(method: Method, values: Mapping[str, Any], *, in_photo: bool)
             assume = getattr(assumptions, how) if how else None
             bare = BARE.get(unit) if how else NAMED.get(unit)
             found[field.name] = Quantity.parse(value, unit, bare=bare, name=field.name, assume=assume)
+        elif isinstance(value, str) and kinds[field.name] is Target:
+            found[field.name] = Target.parse(value, name=field.name, assume=assumptions.size)
         elif value is None and in_photo and "in_photo" in field.metadata:
             found[field.name] = field.metadata["in_photo"]()
     return found
