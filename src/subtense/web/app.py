@@ -130,6 +130,6 @@ def _add_page(app: FastAPI) -> None:
         found = static.assets().get(f"/{path}")
         if found is not None:
             return found.answer(request)
-        if not static.assets() and f"/{path}" in static.PAGES:
+        if f"/{path}" in static.PAGES:
             return Response(static.HOW_TO_BUILD, 503, media_type="text/plain")
         return problem(404, "path", "no such page", "Absent")

@@ -15,7 +15,6 @@ from typing import Any
 from ..errors import SubtenseError
 from .settings import Limits
 
-
 _NO_MEMORY = (
     "memoryerror",
     "failed to allocate",

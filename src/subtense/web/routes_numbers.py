@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import JSONResponse, Response
 
 from ..document import Document
+from ..errors import GeometryError
 from ..photo import Photo
 from ..presets import presets
 from ..quantity import UNITS
@@ -31,6 +32,11 @@ Format = Annotated[
 def shown(document: Document, form: str, photo: Photo | None = None, name: str = "subtense") -> Response:
     """A document as a report; what is no text or JSON comes as a file to save."""
     report = report_of(form, photo=photo is not None)
+    try:
+        json.dumps(document.to_json(), allow_nan=False)
+    except ValueError:
+        text = "the numbers are too large or too small to calculate with: no finite answer is left"
+        raise GeometryError(text, code="not_finite") from None
     content = report.function(document, photo)
     headers = (
         {} if form in ("json", "text") else {"content-disposition": f'attachment; filename="{name}{report.suffix}"'}

@@ -49,6 +49,8 @@ NOUNS: dict[type, dict[str, Any]] = {
 }  # fmt: skip
 """The JSON of each noun, as `to_json` writes it."""
 
+_SAME = {"type": "object", "required": ["$ref"], "properties": {"$ref": {**_TEXT, "pattern": "^#/given/[a-z_]+$"}},
+         "description": "the very same as an earlier field"}  # fmt: skip
 _ALSO_TYPED = "as an object, or as text as on the command line"
 
 
@@ -84,7 +86,7 @@ def _property(inputs: type, field: Any, kind: type) -> dict[str, Any]:
         return {"type": {bool: "boolean", str: "string"}[kind], "description": text, "x-widget": "text"}
     found: dict[str, Any] = {
         "description": text, "x-noun": kind.__name__, "x-widget": kind.widget,
-        "anyOf": [{"type": "string", "description": _ALSO_TYPED}, {"type": "object", **NOUNS[kind]}],
+        "anyOf": [{"type": "string", "description": _ALSO_TYPED}, {"type": "object", **NOUNS[kind]}, _SAME],
     }  # fmt: skip
     for key, name in (("unit", "x-unit"), ("points", "x-points"), ("closed", "x-closed")):
         if key in field.metadata:
