@@ -130,11 +130,13 @@ def read_json(path: Path) -> Any:
 
 
 def _noun_from_json(kind: Any, name: str, data: Any) -> Any:
+    if isinstance(data, Mapping) and not isinstance(data.get("id", ""), str | None):
+        raise InputError(name, str(data["id"]), "give its id as text")
     try:
         return kind.from_json(data)
     except InputError:
         raise
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise InputError(name, type(error).__name__, f"give a {kind.__name__} as JSON") from None
 
 
