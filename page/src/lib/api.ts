@@ -74,6 +74,7 @@ export interface FieldSchema {
 export interface MethodRow {
   name: string;
   title: string;
+  button: string;
   needs: string;
   assumes: string[];
   source: string;

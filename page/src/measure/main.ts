@@ -1,3 +1,4 @@
 import { mount } from "svelte";
-import Shell from "../parts/Shell.svelte";
-void mount;void Shell;
+import Measure from "./Measure.svelte";
+
+mount(Measure, { target: document.getElementById("app")! });

@@ -1,0 +1,377 @@
+/** The measuring page's state: session with undo, photos on the server, answers; what is drawn and pressed is in the components. */
+import { ApiError, get, Latest, post, send, type CameraSaid, type Doc, type GivenCamera, type MethodRow, type Note, type Photo, type Tables, type Target } from "../lib/api";
+import { store } from "../lib/store";
+import { Undo } from "../lib/undo";
+import { EMPTY, inputsOf, nextLabel, PROJECT, readProject, readSheet, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
+
+export type Answer = { state: "done"; doc: Doc } | { state: "wants"; fields: string[] } | { state: "refused"; message: string; field: string | null } | { state: "waits" };
+
+interface Asked {
+  shape: Shape;
+  sheet: Sheet;
+}
+
+const KEEP_EVERY_MS = 30_000;
+
+export class Model {
+  tables: Tables | null = $state.raw(null);
+  targets: Target[] = $state.raw([]);
+  session: Session = $state.raw(EMPTY);
+  photos: Record<string, Photo> = $state.raw({});
+  cameras: Record<string, { said: CameraSaid | null; notes: Note[]; error: string }> = $state.raw({});
+  answers: Record<string, Answer> = $state.raw({});
+  selected: string | null = $state(null);
+  canUndo = $state(false);
+  canRedo = $state(false);
+  trouble = $state("");
+  reachable = $state(true);
+  busy: string[] = $state([]);
+  ready = $state(false);
+
+  private history = new Undo<Session>(EMPTY);
+  private asking = new Map<string, Latest<Asked, Doc>>();
+  private saving: ReturnType<typeof setTimeout> | undefined;
+  private retrying: ReturnType<typeof setTimeout> | undefined;
+  private resending = new Map<string, Promise<boolean>>();
+
+  get sheet(): Sheet | undefined {
+    return this.session.sheets[this.session.current];
+  }
+  get photo(): Photo | undefined {
+    return this.sheet ? this.photos[this.sheet.photo.id] : undefined;
+  }
+  get shape(): Shape | undefined {
+    return this.sheet?.shapes.find((shape) => shape.id === this.selected);
+  }
+  method(name: string): MethodRow | undefined {
+    return this.tables?.methods.find((row) => row.name === name);
+  }
+
+  // -- beginning -----------------------------------------------------------------------------------------
+
+  async start(): Promise<void> {
+    try {
+      this.tables = await get<Tables>("/api/methods");
+      const stored = (await store.session()) as Partial<Session> | undefined;
+      const sheets = (stored?.sheets ?? []).map(readSheet).filter((sheet): sheet is ProjectSheet => sheet !== null);
+      const held = (await get<{ photos: Photo[] }>("/api/photos")).photos;
+      for (const photo of held) this.photos = { ...this.photos, [photo.id]: photo };
+      const fresh = held.filter((photo) => photo.kept && !sheets.some((sheet) => sheet.photo.id === photo.id)).map(sheetOf);
+      const all = [...sheets, ...fresh];
+      const current = fresh.length ? all.indexOf(fresh[0]!) : Math.min(stored?.current ?? 0, Math.max(all.length - 1, 0));
+      this.replace({ sheets: all, current });
+      this.history = new Undo(this.session);
+      this.reachable = true;
+      await Promise.all(all.map((sheet) => this.present(sheet)));
+      this.measureAll();
+    } catch (error) {
+      this.unreachable(error);
+      this.retrying = setTimeout(() => void this.start(), 1000);
+    }
+    this.ready = true;
+    setInterval(() => void this.keep(), KEEP_EVERY_MS);
+    setTimeout(() => void this.loadTargets(), 300);
+  }
+
+  async loadTargets(): Promise<void> {
+    if (!this.targets.length) this.targets = (await get<{ targets: Target[] }>("/api/targets").catch(() => ({ targets: [] }))).targets;
+  }
+
+  // -- the session ---------------------------------------------------------------------------------------
+
+  /** The session as it is while something is dragged: shown and measured, but no step of undo yet. */
+  replace(session: Session): void {
+    this.session = session;
+    clearTimeout(this.saving);
+    this.saving = setTimeout(() => this.save(), 150);
+  }
+
+  /** A step of undo. */
+  commit(session: Session = this.session): void {
+    this.replace(session);
+    this.history.commit(session);
+    this.mark();
+  }
+
+  undo(): void {
+    this.travel(this.history.undo());
+  }
+  redo(): void {
+    this.travel(this.history.redo());
+  }
+
+  private travel(session: Session): void {
+    const before = this.session;
+    this.replace(session);
+    this.mark();
+    if (this.shape === undefined) this.selected = null;
+    session.sheets.forEach((sheet) => {
+      const old = before.sheets.find((other) => other.photo.id === sheet.photo.id);
+      if (!old) void this.present(sheet).then(() => this.measureSheet(sheet));
+      else if (old.camera !== sheet.camera) void this.readCamera(sheet).then(() => this.measureSheet(sheet));
+      else for (const shape of sheet.shapes) if (!old.shapes.includes(shape)) this.measure(shape, sheet);
+    });
+  }
+
+  private mark(): void {
+    this.canUndo = this.history.canUndo;
+    this.canRedo = this.history.canRedo;
+  }
+
+  save(): void {
+    void store.putSession($state.snapshot(this.session));
+  }
+
+  change(change: (sheet: Sheet) => Sheet, commit = true): void {
+    const next = withSheet(this.session, this.session.current, change);
+    if (commit) this.commit(next);
+    else this.replace(next);
+  }
+
+  changeShape(id: string, change: (shape: Shape) => Shape, commit = true): void {
+    this.change((sheet) => withShape(sheet, id, change), commit);
+    const shape = this.sheet?.shapes.find((one) => one.id === id);
+    if (shape && this.sheet) this.measure(shape, this.sheet);
+  }
+
+  add(shapes: Omit<Shape, "id" | "label">[], labels: (string | undefined)[] = []): Shape[] {
+    const sheet = this.sheet;
+    if (!sheet) return [];
+    const made: Shape[] = [];
+    shapes.forEach((shape, i) => {
+      const wished = labels[i];
+      const taken = [...sheet.shapes, ...made].some((other) => other.label === wished);
+      made.push({ ...shape, id: crypto.getRandomValues(new Uint32Array(2)).join("-"), label: wished && !taken ? wished : nextLabel([...sheet.shapes, ...made]) });
+    });
+    this.change((old) => ({ ...old, shapes: [...old.shapes, ...made] }));
+    this.selected = made[0]?.id ?? null;
+    for (const shape of made) this.measure(shape, this.sheet!);
+    return made;
+  }
+
+  remove(id: string): void {
+    this.change((sheet) => ({ ...sheet, shapes: sheet.shapes.filter((shape) => shape.id !== id) }));
+    if (this.selected === id) this.selected = null;
+  }
+
+  setCamera(camera: GivenCamera): void {
+    this.change((sheet) => ({ ...sheet, camera }));
+    const sheet = this.sheet!;
+    void this.readCamera(sheet).then(() => this.measureSheet(sheet));
+  }
+
+  go(index: number): void {
+    this.replace({ ...this.session, current: index });
+    this.selected = null;
+  }
+
+  close(index: number): void {
+    const sheets = this.session.sheets.filter((_, i) => i !== index);
+    this.commit({ sheets, current: Math.min(this.session.current, Math.max(sheets.length - 1, 0)) });
+    this.selected = null;
+  }
+
+  // -- photos --------------------------------------------------------------------------------------------
+
+  async addFiles(files: Iterable<File>): Promise<void> {
+    for (const file of files) {
+      this.busy = [...this.busy, file.name];
+      this.trouble = "";
+      try {
+        if (/\.json$/i.test(file.name) || file.type === "application/json") await this.openProject(await file.text());
+        else await this.addPhoto(file, file.name);
+      } catch (error) {
+        this.trouble = this.unreachable(error) ?? (error instanceof Error ? error.message : String(error));
+      }
+      this.busy = this.busy.filter((name) => name !== file.name);
+    }
+  }
+
+  private async addPhoto(file: Blob, name: string): Promise<void> {
+    const photo = await send(file, name);
+    void store.putPhoto(photo.id, { blob: file, name });
+    this.photos = { ...this.photos, [photo.id]: photo };
+    const known = this.session.sheets.findIndex((sheet) => sheet.photo.id === photo.id);
+    if (known >= 0) {
+      this.replace({ ...this.session, current: known });
+      this.measureSheet(this.session.sheets[known]!);
+      void this.readCamera(this.session.sheets[known]!);
+      return;
+    }
+    const sheet = sheetOf(photo);
+    this.commit({ sheets: [...this.session.sheets, sheet], current: this.session.sheets.length });
+    this.selected = null;
+    await this.readCamera(sheet);
+  }
+
+  /** Have the server hold a sheet's photo: it may have been dropped, or the server may be a new one. */
+  private async present(sheet: Sheet): Promise<void> {
+    if (!this.photos[sheet.photo.id]) await this.resend(sheet.photo.id);
+    if (this.photos[sheet.photo.id]) await this.readCamera(sheet);
+  }
+
+  private resend(id: string): Promise<boolean> {
+    let going = this.resending.get(id);
+    if (!going) {
+      going = this.resendNow(id).finally(() => this.resending.delete(id));
+      this.resending.set(id, going);
+    }
+    return going;
+  }
+
+  private async resendNow(id: string): Promise<boolean> {
+    const stored = await store.photo(id);
+    if (!stored) return false;
+    try {
+      const photo = await send(stored.blob, stored.name);
+      this.photos = { ...this.photos, [photo.id]: photo };
+      return photo.id === id;
+    } catch (error) {
+      this.unreachable(error);
+      return false;
+    }
+  }
+
+  /** Tell the server which photos are still shown, and send again what it has dropped. */
+  async keep(): Promise<void> {
+    const ids = this.session.sheets.map((sheet) => sheet.photo.id);
+    if (!ids.length) return;
+    try {
+      const { absent } = await post<{ absent: string[] }>("/api/photos/keep", { photos: ids });
+      await Promise.all(absent.map((id) => this.resend(id)));
+      if (!this.reachable) {
+        this.reachable = true;
+        this.trouble = "";
+        for (const sheet of this.session.sheets) void this.present(sheet);
+        this.measureAll();
+      }
+    } catch (error) {
+      this.unreachable(error);
+    }
+  }
+
+  /** Note that the server does not answer, and ask until it does; the message, or null for another error. */
+  private unreachable(error: unknown): string | null {
+    if (!(error instanceof ApiError) || error.status !== 0) return null;
+    this.reachable = false;
+    clearTimeout(this.retrying);
+    this.retrying = setTimeout(() => void this.keep(), 1000);
+    return error.message;
+  }
+
+  // -- answers -------------------------------------------------------------------------------------------
+
+  async readCamera(sheet: Sheet): Promise<void> {
+    const key = sheet.photo.id;
+    try {
+      const doc = await this.withPhoto(key, () => post<Doc>("/api/camera", { photo: key, camera: sheet.camera }));
+      this.cameras = { ...this.cameras, [key]: { said: doc.camera, notes: doc.notes, error: "" } };
+    } catch (error) {
+      if (this.unreachable(error)) return;
+      this.cameras = { ...this.cameras, [key]: { said: null, notes: [], error: error instanceof Error ? error.message : String(error) } };
+    }
+  }
+
+  /** Ask something of a photo; where the server has dropped it, send it again and ask once more. */
+  async withPhoto<T>(id: string, work: () => Promise<T>): Promise<T> {
+    try {
+      return await work();
+    } catch (error) {
+      if (error instanceof ApiError && error.status === 404 && (await this.resend(id))) return work();
+      throw error;
+    }
+  }
+
+  measureAll(): void {
+    for (const sheet of this.session.sheets) this.measureSheet(sheet);
+  }
+
+  measureSheet(sheet: Sheet): void {
+    const now = this.session.sheets.find((other) => other.photo.id === sheet.photo.id);
+    for (const shape of now?.shapes ?? []) this.measure(shape, now!);
+  }
+
+  measure(shape: Shape, sheet: Sheet): void {
+    const row = this.method(shape.method);
+    const missing = row ? wanting(shape, row) : [];
+    if (!row) return this.tell(shape.id, { state: "refused", message: `this server has no method ${shape.method}`, field: null });
+    if (missing.length) return this.tell(shape.id, { state: "wants", fields: missing });
+    if (!this.answers[shape.id]) this.tell(shape.id, { state: "waits" });
+    let asking = this.asking.get(shape.id);
+    if (!asking) {
+      asking = new Latest<Asked, Doc>(
+        ({ shape, sheet }) =>
+          this.withPhoto(sheet.photo.id, () =>
+            post<Doc>(`/api/measure/${shape.method}`, { photo: sheet.photo.id, camera: sheet.camera, label: shape.label, inputs: inputsOf(shape) }),
+          ),
+        (doc, { shape }) => this.tell(shape.id, { state: "done", doc }),
+        (error, { shape }) => {
+          if (this.unreachable(error)) return;
+          const field = error instanceof ApiError ? error.field : null;
+          this.tell(shape.id, { state: "refused", message: error instanceof Error ? error.message : String(error), field });
+        },
+      );
+      this.asking.set(shape.id, asking);
+    }
+    asking.ask({ shape, sheet });
+  }
+
+  private tell(id: string, answer: Answer): void {
+    this.answers = { ...this.answers, [id]: answer };
+  }
+
+  /** The body of POST /api/measure for a sheet: what it has that can be measured. */
+  request(sheet: Sheet): Record<string, unknown> {
+    const items = sheet.shapes
+      .filter((shape) => {
+        const row = this.method(shape.method);
+        return row && !wanting(shape, row).length;
+      })
+      .map((shape) => ({ method: shape.method, label: shape.label, inputs: inputsOf(shape) }));
+    return { photo: sheet.photo.id, camera: sheet.camera, items };
+  }
+
+  // -- project files -------------------------------------------------------------------------------------
+
+  async project(withPictures: boolean): Promise<Blob> {
+    const sheets: ProjectSheet[] = [];
+    for (const sheet of this.session.sheets) {
+      const stored = withPictures ? await store.photo(sheet.photo.id) : undefined;
+      const data = stored ? await base64(stored.blob) : undefined;
+      sheets.push({ ...$state.snapshot(sheet), ...(data ? { data } : {}) } as ProjectSheet);
+    }
+    return new Blob([JSON.stringify({ schema: PROJECT, sheets }, null, 1)], { type: "application/json" });
+  }
+
+  private async openProject(text: string): Promise<void> {
+    const project = readProject(text);
+    if (typeof project === "string") throw new Error(project);
+    for (const { data, ...sheet } of project.sheets) {
+      if (data) {
+        const blob = new Blob([Uint8Array.from(atob(data), (c) => c.charCodeAt(0))]);
+        const photo = await send(blob, sheet.photo.name);
+        if (photo.sha256 !== sheet.photo.sha256) throw new Error(`${sheet.photo.name}: the picture in the project is not the one that was measured`);
+        void store.putPhoto(photo.id, { blob, name: photo.name });
+        this.photos = { ...this.photos, [photo.id]: photo };
+      }
+      const index = this.session.sheets.findIndex((other) => other.photo.id === sheet.photo.id);
+      const sheets = index < 0 ? [...this.session.sheets, sheet] : this.session.sheets.map((other, i) => (i === index ? sheet : other));
+      this.commit({ sheets, current: index < 0 ? sheets.length - 1 : index });
+      await this.present(sheet);
+      this.measureSheet(sheet);
+    }
+    this.selected = null;
+  }
+}
+
+function sheetOf(photo: Photo): Sheet {
+  const { id, name, width_px, height_px, sha256 } = photo;
+  return { photo: { id, name, width_px, height_px, sha256 }, camera: null, shapes: [] };
+}
+
+async function base64(blob: Blob): Promise<string> {
+  const bytes = new Uint8Array(await blob.arrayBuffer());
+  const parts: string[] = [];
+  for (let i = 0; i < bytes.length; i += 0x8000) parts.push(String.fromCharCode(...bytes.subarray(i, i + 0x8000)));
+  return btoa(parts.join(""));
+}
