@@ -71,6 +71,11 @@ class Inputs:
     def __post_init__(self) -> None:
         if self.along not in ("width", "height"):
             raise InputError("along", self.along, "give width or height")
+        missing = [name for name in UNKNOWNS if getattr(self, name) is None]
+        if len(missing) != 1:
+            raise InputError(
+                "the unknown", ", ".join(missing) or "nothing", f"leave out exactly one of {', '.join(UNKNOWNS)}"
+            )
 
     @property
     def unknown(self) -> str:

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from .. import propagate
+from ..arrays import Array
 from ..document import Document
 from ..errors import GeometryError, InputError
 from ..methods import calculator
+from ..noun import fields_of
 from ..quantity import Measurement, Quantity
 from .given import given
 from .improve import improved
@@ -28,13 +30,13 @@ def calculate(
     """Solve the classical relation for the value that was left out.
 
     Args:
-        inputs: with exactly one of distance, size, extent, focal_length, sensor_width, image_width left as None.
+        inputs: of the calculator; the value left as None is solved for.
         image_height: px, to check an extent along the height against; None if unknown.
         level: coverage of the intervals.
         seed: of the draws, where they are needed.
 
     Raises:
-        InputError: not exactly one unknown, a value of 0 or below, an extent wider than the picture.
+        InputError: a value of 0 or below, an extent wider than the picture.
         GeometryError: no finite answer.
     """
     _check(inputs, image_height)
@@ -72,10 +74,6 @@ def _check_answer(found: dict[str, Measurement], inputs: calculator.Inputs, imag
 
 
 def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
-    missing = [name for name in calculator.UNKNOWNS if getattr(inputs, name) is None]
-    if len(missing) != 1:
-        names = ", ".join(calculator.UNKNOWNS)
-        raise InputError("the unknown", ", ".join(missing) or "nothing", f"leave out exactly one of {names}")
     for name in (*calculator.UNKNOWNS, "aspect"):
         quantity = getattr(inputs, name)
         if quantity is not None and not np.all(np.asarray(quantity.value) > 0):
@@ -93,31 +91,46 @@ def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
         raise InputError("tilt", f"{np.degrees(float(inputs.tilt.value)):g}°", "give an angle between -90° and 90°")
 
 
-def curve(inputs: calculator.Inputs, *, level: float = 0.95, points: int = 49) -> dict[str, Any]:
+CURVE_DRAWS = 5000
+"""Of a band: its limits scatter by about a hundredth of its width."""
+
+
+def curve(inputs: calculator.Inputs, *, level: float = 0.95, points: int = 49, seed: int = 0) -> dict[str, Any]:
     """The unknown over the extent (over the distance where the extent is the unknown), with its band, for a chart.
 
-    The band is of first order in the logarithm, so that it stays above 0; near the value asked for it agrees with the
-    interval of `calculate`.
+    The band is that of the same draws at all points, so that it is smooth. A distance is known to so many per cent
+    everywhere, an extent to so many pixels. Points without an answer, or with an open limit, are left out.
 
     Args:
         inputs: as for `calculate`.
         level: coverage of the band.
         points: how many, evenly spaced in the logarithm over a factor of 20 each way.
+        seed: of the draws.
     """
     unknown = inputs.unknown
     moved = "distance" if unknown == "extent" else "extent"
     at = getattr(inputs, moved)
-    x = float(at.value) * np.geomspace(1 / 20, 20, points)
+    nominal = float(at.value)
+    x = nominal * np.geomspace(1 / 20, 20, points)
     widest = float(inputs.image_width.value) if moved == "extent" and inputs.image_width is not None else np.inf
-    x = x[x <= max(widest, float(at.value))]
-    # a distance is known to so many per cent, an extent to so many pixels
-    u = float(at.u) * (x / float(at.value) if moved == "distance" else np.ones_like(x))
-    many = dataclasses.replace(inputs, **{moved: dataclasses.replace(at, value=x, u=u)})
-    found = propagate.rows(calculator.METHOD, many, level=level, threads=1)
-    row = found.names.index(_FIELD_OF[unknown])
-    value, answered = found.value[row], found.reason == 0
-    spread = np.exp(found.coverage[row] * found.u[row] / value)
-    columns = {"x": x, "value": value, "low": value / spread, "high": value * spread}
+    x = x[x <= max(widest, nominal)]
+    known = {name: q for name, q in fields_of(inputs).items() if isinstance(q, Quantity)}
+
+    def solved(**values: float | Array) -> dict[str, Array]:
+        grid = x[:, None] + (values[moved] - nominal) * (1 if moved == "extent" else x[:, None] / nominal)
+        there: dict[str, Any] = {
+            name: dataclasses.replace(known[name], value=v) for name, v in {**values, moved: grid}.items()
+        }
+        result = calculator.calculator(dataclasses.replace(inputs, **there))
+        found = np.where(result.reason == 0, getattr(result, _FIELD_OF[unknown]), np.nan)
+        return {str(i): row for i, row in enumerate(found)}
+
+    value = np.array(list(solved(**{name: q.value for name, q in known.items()}).values()))[:, 0]
+    drawn = propagate.sample(solved, known, CURVE_DRAWS, seed=seed)
+    low, high = np.array([drawn.interval(i, level) for i in range(len(x))]).T
+    # a one-sided doubt puts the value at an end of what is possible; the band is never without it
+    columns = {"x": x, "value": value, "low": np.minimum(low, value).clip(0.0), "high": np.maximum(high, value)}
+    answered = np.isfinite(value) & np.isfinite(high)
     return {
         "x_what": moved, "y_what": unknown, "x_unit": at.unit, "y_unit": "px" if unknown in ("extent", "image_width") else "m",
         **{name: column[answered].tolist() for name, column in columns.items()},

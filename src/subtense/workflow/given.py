@@ -13,6 +13,7 @@ from typing import Any
 from ..errors import FileFormatError, InputError
 from ..method import Method
 from ..noun import Noun, fields_of
+from ..observation import Observation
 from ..quantity import Quantity
 
 NAMED = {"m": "no unit", "rad": "no unit"}
@@ -146,4 +147,8 @@ def _made(method: Method, values: Mapping[str, Any]) -> Any:
     missing = [name for name in needed if values.get(name) is None]
     if missing:
         raise InputError("inputs", "incomplete", f"{method.name} also needs {', '.join(missing)}")
+    for field in dataclasses.fields(method.inputs):
+        seen, wanted = values.get(field.name), field.metadata.get("points")
+        if wanted and isinstance(seen, Observation) and seen.points_px.shape[-2] != wanted:
+            raise InputError(field.name, f"{seen.points_px.shape[-2]} points", f"give {wanted}")
     return method.inputs(**values)
