@@ -61,9 +61,11 @@ export function inputsOf(shape: Shape): Record<string, unknown> {
   const inputs: Record<string, unknown> = {};
   const sigma = Number(shape.sigma.replace(",", "."));
   const stated = shape.sigma.trim() !== "" && Number.isFinite(sigma) && sigma >= 0;
+  const several = Object.keys(shape.points).length > 1;
   for (const [name, points] of Object.entries(shape.points)) {
     inputs[name] = shape.seen?.[name] ?? {
       points_px: points,
+      ...(several ? { label: name } : {}),
       sigma_px: stated ? sigma : CLICK_SIGMA,
       source: stated ? "clicked, as stated" : `assumed: a clicked end is known to ${CLICK_SIGMA} px`,
     };

@@ -30,13 +30,16 @@ export function tileSource(photo: Photo): OpenSeadragon.TileSourceOptions {
   } as OpenSeadragon.TileSourceOptions;
 }
 
-/** The viewer would add a sheet of its own, which the content security policy forbids: it takes this one for it (see page.css). */
+/**
+ * The viewer would add a style sheet of its own, which the content security policy forbids. It looks for an element named
+ * `style` first; one of another namespace is no sheet, and is found. Its rule stands in page.css.
+ */
 function standInForItsSheet(): void {
   const mark = "data-openseadragon-mobile-css";
   if (document.querySelector(`style[${mark}]`)) return;
-  const style = document.createElement("style");
-  style.setAttribute(mark, "true");
-  document.head.append(style);
+  const mock = document.createElementNS("urn:subtense", "style");
+  mock.setAttribute(mark, "true");
+  document.head.append(mock);
 }
 
 export function viewer(element: HTMLElement): OpenSeadragon.Viewer {
