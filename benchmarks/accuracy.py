@@ -18,7 +18,7 @@ import test_coverage as coverage  # noqa: E402
 import test_real_pictures as real  # noqa: E402
 
 from subtense import Photo, Quantity, measure_lines, measure_markers, resolve_camera  # noqa: E402
-from subtense.methods import known_size, pose  # noqa: E402
+from subtense.methods import known_distance, known_size, pose, same_plane  # noqa: E402
 from subtense.observation import Observation  # noqa: E402
 
 PAGE = ROOT / "docs" / "accuracy.md"
@@ -32,9 +32,11 @@ def percent(x: float, digits: int = 1) -> str:
 
 
 def simulated() -> list[Row]:
-    """Coverage of the range, share of truths below the interval, u of the range, for 1,000 scenes a geometry."""
+    """Coverage of the headline, share of truths below the interval, u of the headline, for 1,000 scenes a geometry."""
     rows = [("method", "geometry", "intervals that hold the truth", "truth below / above", "typical u")]
     jobs = [(known_size.METHOD, coverage.known_size_scene, kind) for kind in coverage.GEOMETRY]
+    jobs += [(known_distance.METHOD, coverage.known_distance_scene, kind) for kind in coverage.GEOMETRY]
+    jobs += [(same_plane.METHOD, coverage.plane_scene, kind) for kind in coverage.PLANES]
     jobs += [(pose.METHOD, coverage.marker_scene, kind) for kind in ("near", "typical", "tilted")]
     for method, make, kind in jobs:
         hit, below, _, width, _ = coverage.score(method, make, kind)
