@@ -178,7 +178,7 @@ def answers(port: int) -> bool:
         return False
 
 
-def until(what, seconds: float = 10.0) -> bool:
+def until(what, seconds: float = 60.0) -> bool:
     """Whether it comes true in time."""
     end = time.monotonic() + seconds
     while not what():

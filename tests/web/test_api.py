@@ -565,14 +565,14 @@ def test_a_job_tells_its_progress_until_it_is_done(server, desk):
 
 
 def test_a_cancelled_job_leaves_no_process(server):
-    held = server.photo(picture(5000, 4000, "JPEG", seed=3, quality=80), "large.jpg")
+    held = server.photo(picture(2000, 1600, "JPEG", seed=3, quality=80), "large.jpg")
     job = server.client.post("/api/jobs", json={"detector": "markers", "photo": held["id"]}).json()["id"]
     assert until(lambda: server.client.get(f"/api/jobs/{job}").json()["progress"] > 0)
     assert len(server.children()) == 1
     began = time.monotonic()
     assert server.client.delete(f"/api/jobs/{job}").status_code == 204
-    assert until(lambda: not server.children(), 2)
-    assert time.monotonic() - began < 2
+    assert until(lambda: not server.children(), 5)
+    assert time.monotonic() - began < 5
     assert until(lambda: server.client.get(f"/api/jobs/{job}").json()["state"] == "cancelled", 2)
     name, data = events(server, job)[-1]
     assert name == "cancelled" and data["result"] is None and data["error"] is None

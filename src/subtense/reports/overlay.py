@@ -97,7 +97,7 @@ def _plate(
     """The caption on a dark plate beside the shape, inside the picture, off the plates already there."""
     from PIL import ImageFont
 
-    font = ImageFont.load_default(size=22 * unit)
+    font = ImageFont.load_default(size=max(22 * unit, 1))
     boxes = [pen.textbbox((0, 0), line, font=font) for line in lines]
     pad, step = 8 * unit, 28 * unit
     width, height = max(b[2] for b in boxes) + 2 * pad, step * len(lines) + 1.5 * pad

@@ -60,13 +60,16 @@ def _announced(scope: Scope) -> int:
 
 def _counted(receive: Receive, name: str, most: int, announced: int) -> Receive:
     seen = 0
+    over = LimitError(name, f"the request is larger than {most} bytes ({name})")
 
     async def counted() -> Message:
         nonlocal seen
+        if announced > most:  # before any of it is awaited
+            raise over
         message = await receive()
         seen += len(message.get("body", b""))
-        if max(seen, announced) > most:
-            raise LimitError(name, f"the request is larger than {most} bytes ({name})")
+        if seen > most:
+            raise over
         return message
 
     return counted

@@ -1,6 +1,7 @@
 """A limited child process: it alone decodes what strangers send, and searches in it.
 
-It has no network, a bounded address space, processor time and file size, no standard input, and an empty folder of its own.
+It has no network, a bounded address space, processor time and file size, no standard input, and an empty folder of its own,
+where alone it may write.
 It prints one JSON object a line: {"progress": share}, and at last {"result": ...} or {"error": {...}}.
 """
 
@@ -10,6 +11,7 @@ import ctypes
 import json
 import os
 import platform
+import signal
 import struct
 import sys
 from pathlib import Path
@@ -66,31 +68,67 @@ def limit(limits: dict[str, int]) -> None:
                 resource.setrlimit(kind, (most, most))
             except (ValueError, OSError):  # macOS refuses some
                 continue
+    _end_with_the_server()
+    write_only_in(Path())
     deny_network()
 
 
-_SOCKET_CALLS = {"x86_64": (0xC000003E, (41, 59, 322)), "aarch64": (0xC00000B7, (198, 221, 281))}
-"""Audit architecture, and the numbers of socket, execve, execveat."""
+_ARCHITECTURES = {
+    "x86_64": (0xC000003E, (41, 59, 322, 101, 310, 311, 425, 438)),
+    "aarch64": (0xC00000B7, (198, 221, 281, 117, 270, 271, 425, 438)),
+}
+"""Audit architecture, and the numbers of socket, execve, execveat, ptrace, process_vm_readv, process_vm_writev, io_uring_setup,
+pidfd_getfd: the last five are other doors to a socket."""
 
 
 def deny_network() -> bool:
-    """On Linux: a seccomp filter under which `socket` and `execve` fail; False where there is none."""
-    if sys.platform != "linux" or platform.machine() not in _SOCKET_CALLS:
+    """On Linux: a seccomp filter under which sockets and programs can't be had; False where there is none."""
+    if sys.platform != "linux" or platform.machine() not in _ARCHITECTURES:
         return False
-    architecture, calls = _SOCKET_CALLS[platform.machine()]
-    load, equal, give = 0x20, 0x15, 0x06
+    architecture, calls = _ARCHITECTURES[platform.machine()]
+    load, equal, least, give = 0x20, 0x15, 0x35, 0x06
     allow, refuse = 0x7FFF0000, 0x00050001  # SECCOMP_RET_ALLOW; SECCOMP_RET_ERRNO | EPERM
-    steps = [(load, 0, 0, 4), (equal, 0, len(calls) + 2, architecture), (load, 0, 0, 0)]
-    steps += [(equal, len(calls) - i, 0, call) for i, call in enumerate(calls)]
+    end = len(calls) + 5
+    steps = [(load, 0, 0, 4), (equal, 0, end - 2, architecture), (load, 0, 0, 0)]
+    steps += [(least, end - 4, 0, 0x40000000)]  # the numbers of x86's other calling convention
+    steps += [(equal, end - 5 - i, 0, call) for i, call in enumerate(calls)]
     steps += [(give, 0, 0, allow), (give, 0, 0, refuse)]
     code = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *step) for step in steps))
-    program = struct.pack("HxxxxxxP", len(steps), ctypes.addressof(code))
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.prctl(38, 1, 0, 0, 0):  # PR_SET_NO_NEW_PRIVS
+    program = ctypes.create_string_buffer(struct.pack("HxxxxxxP", len(steps), ctypes.addressof(code)))
+    libc = _unprivileged()
+    return bool(libc.prctl(22, 2, program, 0, 0) == 0)  # PR_SET_SECCOMP, SECCOMP_MODE_FILTER
+
+
+def write_only_in(folder: Path) -> bool:
+    """On Linux 5.13 or later: a Landlock rule by which files are made and changed below a folder only; False where there is none."""
+    if sys.platform != "linux":
         return False
-    return bool(
-        libc.prctl(22, 2, ctypes.create_string_buffer(program), 0, 0) == 0
-    )  # PR_SET_SECCOMP, SECCOMP_MODE_FILTER
+    libc = _unprivileged()
+    version = libc.syscall(444, None, 0, 1)  # landlock_create_ruleset, for its version
+    if version < 1:
+        return False
+    rights = 1 << 1 | sum(1 << bit for bit in range(4, 13))  # write; remove and make entries of every kind
+    rights |= (1 << 13 if version >= 2 else 0) | (1 << 14 if version >= 3 else 0)  # move between folders; truncate
+    ruleset = libc.syscall(444, ctypes.create_string_buffer(struct.pack("Q", rights), 8), 8, 0)
+    place = os.open(folder, os.O_PATH | os.O_DIRECTORY)
+    rule = ctypes.create_string_buffer(struct.pack("=Qi", rights, place), 12)
+    made = bool(ruleset >= 0 and libc.syscall(445, ruleset, 1, rule, 0) == 0 and libc.syscall(446, ruleset, 0) == 0)
+    os.close(place)
+    if ruleset >= 0:
+        os.close(ruleset)
+    return made
+
+
+def _unprivileged() -> Any:
+    """The C library, after this process gave up ever getting more rights."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    libc.prctl(38, 1, 0, 0, 0)  # PR_SET_NO_NEW_PRIVS
+    return libc
+
+
+def _end_with_the_server() -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)  # PR_SET_PDEATHSIG
 
 
 # -- what it does ------------------------------------------------------------------------------------

@@ -81,6 +81,7 @@ def serve(
     import uvicorn
 
     from .app import create_app
+    from .server import Server
 
     for photo in photos:
         if not photo.is_file():
@@ -97,9 +98,10 @@ def serve(
     say("photos stay on this machine; end with Ctrl+C")
     if browser:
         _open_soon(opened)
-    config = uvicorn.Config(create_app(settings, photos), log_level="error", server_header=False, proxy_headers=False,
+    app = create_app(settings, photos)
+    config = uvicorn.Config(app, log_level="error", server_header=False, proxy_headers=False,
                             access_log=False, timeout_graceful_shutdown=2, ws="none")  # fmt: skip
-    uvicorn.Server(config).run(sockets=[bound])
+    Server(config, app.state.subtense.jobs).run(sockets=[bound])
 
 
 def _bound(host: str, port: int) -> socket.socket:
