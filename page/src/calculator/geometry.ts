@@ -53,3 +53,13 @@ export function drawing(given: Given, width: number, height: number): Drawing | 
     cameraScale: 1 / perCameraMetre,
   };
 }
+
+/** y at x on a curve through points, straight between them on logarithmic axes, and beyond its ends. */
+export function along(xs: readonly number[], ys: readonly number[], x: number): number {
+  if (xs.length < 2) return ys[0] ?? NaN;
+  let i = xs.findIndex((one) => one >= x);
+  if (i < 0) i = xs.length - 1;
+  i = Math.max(i, 1);
+  const [x0, x1, y0, y1] = [xs[i - 1]!, xs[i]!, ys[i - 1]!, ys[i]!].map(Math.log) as [number, number, number, number];
+  return Math.exp(y0 + ((Math.log(x) - x0) / (x1 - x0)) * (y1 - y0));
+}
