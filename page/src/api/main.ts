@@ -1,0 +1,4 @@
+import { mount } from "svelte";
+import Api from "./Api.svelte";
+
+mount(Api, { target: document.getElementById("app")! });
