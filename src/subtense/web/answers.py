@@ -26,6 +26,7 @@ class Method(_Answer):
 
     name: str
     title: str
+    button: str
     needs: str
     assumes: list[str]
     source: str

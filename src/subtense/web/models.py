@@ -22,8 +22,8 @@ class _Body(BaseModel):
 
 
 class _Evaluated(_Body):
-    level: float = Field(0.95, ge=0.5, le=0.999, description="coverage of the intervals")
-    seed: int = Field(0, ge=0, le=2**32 - 1, description="of Monte Carlo draws, where they are needed")
+    level: float = Field(0.95, strict=True, ge=0.5, le=0.999, description="coverage of the intervals")
+    seed: int = Field(0, strict=True, ge=0, le=2**32 - 1, description="of Monte Carlo draws, where they are needed")
 
 
 class Calc(_Evaluated):
@@ -106,7 +106,7 @@ class Sheet(_Evaluated):
 
     photo: PhotoId
     camera: GivenCamera = None
-    items: Annotated[list[Item], Field(max_length=500)] = Field(default_factory=list)
+    items: Annotated[list[Item], Field(max_length=200)] = Field(default_factory=list)
 
     model_config = _shown({"photo": _ID, "items": [{"method": "known_size", "inputs": {
         "ends": "120,80;640,80", "size": "200 mm"}, "label": "shelf"}]})  # fmt: skip

@@ -15,7 +15,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from ..errors import InputError, UnknownCameraError
 from ..workflow.calculator_of import calculator_of
 from ..workflow.in_photo import Item, measure_item, measure_items
-from ..workflow.measure import camera_document
+from ..workflow.measure import camera_document, no_camera_document
 from ..workflow.tables import DETECTORS, METHODS
 from . import answers as shapes
 from . import models
@@ -101,7 +101,12 @@ _TILE: dict[int | str, Any] = {200: {"description": "the tile", "content": {"ima
 Count = Annotated[int, InPath(ge=0, le=10**6)]
 
 
-@router.get("/photos/{photo}/tiles/{level}/{column}_{row}.{form}", summary="A tile of 512 px", responses=_TILE)
+@router.get(
+    "/photos/{photo}/tiles/{level}/{column}_{row}.{form}",
+    summary="A tile of 512 px",
+    responses=_TILE,
+    response_class=Response,
+)
 def get_tile(request: Request, photo: Id, level: Annotated[int, InPath(ge=0, le=40)], column: Count, row: Count,
              form: Literal["jpg", "png"]) -> Response:  # fmt: skip
     """Level 0 is the smallest; the last one is the photo at full size. PNG has the exact pixels."""
@@ -118,10 +123,15 @@ def get_tile(request: Request, photo: Id, level: Annotated[int, InPath(ge=0, le=
 @router.post("/camera", summary="The camera of a photo, by every source",
              responses=answers(ref("document"), more=reports()))  # fmt: skip
 def post_camera(request: Request, body: models.OfPhoto, form: Format = "json") -> Response:
-    """As `subtense camera`: what was chosen and why, its u, and what the other sources say."""
+    """As `subtense camera`: what was chosen and why, its u, and what the other sources say.
+
+    Where nothing tells the camera, `camera` is null, and the note `unknown_camera` says what was tried and what to give.
+    """
     photo = held(request, body.photo)
-    resolved = _known(camera_for(state_of(request), photo, body.camera))
-    return shown(camera_document(photo.photo, resolved), form, photo.photo)
+    found = camera_for(state_of(request), photo, body.camera)
+    if isinstance(found, UnknownCameraError):
+        return shown(no_camera_document(photo.photo, found), form, photo.photo)
+    return shown(camera_document(photo.photo, found), form, photo.photo)
 
 
 @router.post("/camera/calculator", summary="What a photo fills into the calculator", responses=gives(shapes.Texts))
@@ -175,7 +185,7 @@ async def _search(request: Request, detector: str, photo: Held, job: Job | None 
     state = state_of(request)
     limits = state.settings.limits
     pixels = photo.levels[0]
-    task = {"do": "detect", "detector": detector, "name": photo.photo.path.name, "path": str(photo.folder / "pixels.bin"),
+    task = {"do": "detect", "detector": detector, "name": photo.photo.name, "path": str(photo.folder / "pixels.bin"),
             "size": [pixels.shape[1], pixels.shape[0]]}  # fmt: skip
     async with state.children.place():
         found: list[dict[str, Any]] = await state.children.run(
@@ -235,7 +245,9 @@ _EVENTS: dict[int | str, Any] = {
 }
 
 
-@router.get("/jobs/{job}/events", summary="A job's progress as server-sent events", responses=_EVENTS)
+@router.get(
+    "/jobs/{job}/events", summary="A job's progress as server-sent events", responses=_EVENTS, response_class=Response
+)
 async def get_events(request: Request, job: JobId) -> Response:
     """Events are named by the job's state; their data is that of GET /api/jobs/{job}."""
     headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
