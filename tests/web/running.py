@@ -146,15 +146,17 @@ def command(*words: str) -> list[str]:
 
 
 @contextlib.contextmanager
-def serving(folder: Path, *words: str, password: str | None = None) -> Iterator[Server]:
+def serving(
+    folder: Path, *words: str, password: str | None = None, port: int | None = None, state: Path | None = None
+) -> Iterator[Server]:
     """A server with its own state and temporary files in a folder; `words` are further arguments."""
     temp = folder / "tmp"
     temp.mkdir(parents=True)
     environment = {k: v for k, v in os.environ.items() if k != "SUBTENSE_PASSWORD"}
-    environment |= {"SUBTENSE_STATE": str(folder / "state"), "TMPDIR": str(temp)}
+    environment |= {"SUBTENSE_STATE": str(state or folder / "state"), "TMPDIR": str(temp)}
     if password:
         environment["SUBTENSE_PASSWORD"] = password
-    port, log = free_port(), folder / "log"
+    port, log = port or free_port(), folder / "log"
     with log.open("wb") as out:
         process = subprocess.Popen(command("--no-browser", "--port", str(port), *words), env=environment, stdout=out,
                                    stderr=out, stdin=subprocess.DEVNULL)  # fmt: skip
@@ -162,7 +164,7 @@ def serving(folder: Path, *words: str, password: str | None = None) -> Iterator[
     while not answers(port):
         assert process.poll() is None and time.monotonic() < until, log.read_text()
         time.sleep(0.05)
-    token = folder / "state" / "token"
+    token = (state or folder / "state") / "token"
     server = Server(process, port, token.read_text() if token.exists() else "", temp, log, log.read_text())
     try:
         yield server

@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +128,7 @@ class Photos:
         old = self.held.get(held.id)
         if old is not None:
             shutil.rmtree(held.folder, ignore_errors=True)
-            old.kept, old.asked_s = old.kept or kept, time.monotonic()
+            old.kept, old.asked_s, old.photo = old.kept or kept, time.monotonic(), replace(old.photo, name=held.photo.name)
             return old
         self.held[held.id] = held
         self.sweep()

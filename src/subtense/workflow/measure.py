@@ -11,7 +11,7 @@ import numpy as np
 from ..detectors.markers import FAMILIES, markers
 from ..distribution import normal_quantile
 from ..document import Document
-from ..errors import FileFormatError, InputError, NothingFoundError
+from ..errors import FileFormatError, InputError, NothingFoundError, UnknownCameraError
 from ..method import Method
 from ..methods import known_size, pose
 from ..observation import Observation
@@ -113,6 +113,11 @@ def measure_inputs(
     return measure_item(
         Item(method, {k: v for k, v in vars(inputs).items() if v is not None}), None, None, level=level, seed=seed
     )
+
+
+def no_camera_document(photo: Photo, why: UnknownCameraError) -> Document:
+    """A photo whose camera nothing tells, which is no failure of the one who asks: a document with a note."""
+    return Document((), None, photo.to_json(), (*photo.notes, Note("unknown_camera", str(why))))
 
 
 def camera_document(photo: Photo, given_camera: str | Resolved | None = None, *, level: float = 0.95) -> Document:
