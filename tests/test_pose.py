@@ -129,3 +129,17 @@ def test_the_order_of_the_points_does_not_matter(order):
     other = pose.Inputs(CAMERA, Observation(inputs.points.points_px[order], 0.1), target)
     first, again = (propagate.measure(pose.METHOD, i)[0] for i in (inputs, other))
     assert (again.value, again.u) == pytest.approx((first.value, first.u), rel=1e-6)
+
+
+@pytest.mark.opencv
+def test_points_that_do_not_fit_are_noted():
+    """A sheet whose sides were exchanged, and clicks of the stated noise."""
+    there = Pose(rotation_from_vector(np.array([0.6, 0.1, 0.05])), np.array([0.0, 0.02, 0.7]))
+    q = Quantity.normal
+    sheet, other = (Target.rectangle(q(w, 1e-4, "m"), q(h, 1e-4, "m"), "sheet") for w, h in ((0.21, 0.297), (0.297, 0.21)))
+    clicks = CAMERA.project(there.apply(sheet.points_m)) + np.random.default_rng(3).normal(0, 0.7, (4, 2))
+    right, wrong = (pose.Inputs(CAMERA, Observation(clicks, 0.7), target) for target in (sheet, other))
+    assert "points_misfit" not in {n.code for n in propagate.measure(pose.METHOD, right)[0].notes}
+    found = propagate.measure(pose.METHOD, wrong)[0]
+    assert "points_misfit" in {n.code for n in found.notes}
+    assert abs(found.value - 0.7) > 3 * found.u  # what the note is for

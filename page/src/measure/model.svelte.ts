@@ -265,7 +265,8 @@ export class Model {
     const key = sheet.photo.id;
     try {
       const doc = await this.withPhoto(key, () => post<Doc>("/api/camera", { photo: key, camera: sheet.camera }));
-      this.cameras = { ...this.cameras, [key]: { said: doc.camera, notes: doc.notes, error: "" } };
+      const unknown = doc.camera ? undefined : doc.notes.find((note) => note.code === "unknown_camera");
+      this.cameras = { ...this.cameras, [key]: { said: doc.camera, notes: doc.notes, error: unknown ? `${unknown.text}; ${unknown.cure}` : "" } };
     } catch (error) {
       if (this.unreachable(error)) return;
       this.cameras = { ...this.cameras, [key]: { said: null, notes: [], error: error instanceof Error ? error.message : String(error) } };
@@ -296,6 +297,8 @@ export class Model {
     const missing = row ? wanting(shape, row) : [];
     if (!row) return this.tell(shape.id, { state: "refused", message: `this server has no method ${shape.method}`, field: null });
     if (missing.length) return this.tell(shape.id, { state: "wants", fields: missing });
+    const camera = this.cameras[sheet.photo.id];
+    if (camera?.error && row.inputs.required.includes("camera")) return this.tell(shape.id, { state: "refused", message: camera.error, field: "camera" });
     if (!this.answers[shape.id]) this.tell(shape.id, { state: "waits" });
     let asking = this.asking.get(shape.id);
     if (!asking) {

@@ -34,6 +34,8 @@ SETTLED = 1e-13
 """A step of the nominal solution (rad, m) below which it has converged."""
 TELLING_RAD = math.radians(3.0)
 """Two solutions whose faces differ by less are not called ambiguous."""
+MISFIT_Z = 4.75
+"""Normal quantile (1 in 1e6) beyond which residuals are no chance; a nominal focal length bends them a little too."""
 LEAST_WEIGHT = 0.01
 """A second solution of less weight is left out."""
 
@@ -272,10 +274,24 @@ def prepare(inputs: Inputs) -> Inputs:
     return replace(inputs, ambiguity=either)
 
 
+def _misfit(inputs: Inputs, begin: Start) -> float:
+    """Residual of the better solution in what is stated of the points, where it is beyond chance; 0 else."""
+    freedom = 2 * inputs.points.points_px.shape[-2] - 6
+    spread = 2 / (9 * freedom)
+    most = freedom * (1 - spread + MISFIT_Z * math.sqrt(spread)) ** 3  # Wilson and Hilferty's quantile of chi^2
+    chi2 = begin.chi2[0] if begin.chi2 else 0.0
+    return math.sqrt(chi2 / freedom) if chi2 > most else 0.0
+
+
 def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
-    """`pose_ambiguous` and `close_focus`."""
+    """`points_misfit`, `pose_ambiguous` and `close_focus`."""
     begin = start(inputs)
     found = []
+    misfit = _misfit(inputs, begin)
+    if misfit:
+        found.append(Note("points_misfit", f"the points do not fit the target: they are off by {misfit:.2g} times what is stated of "
+                          "them, and the interval is too narrow", "check that the points are those of the target in its order, which "
+                          "side is which, and the camera"))  # fmt: skip
     if begin.weight >= LEAST_WEIGHT and begin.apart_rad > TELLING_RAD:
         other = _numbers(begin.poses[1], inputs, _normalised(inputs.camera, inputs.points), begin.whiten)
         text = (f"a second pose fits nearly as well (probability {begin.weight:.0%}): tilt {math.degrees(float(other[2])):.0f}° "
