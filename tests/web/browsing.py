@@ -5,7 +5,7 @@ import shutil
 from dataclasses import dataclass, field
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import Browser, BrowserContext, Page, Response
 from running import STATIC, Server
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -28,6 +28,7 @@ class Visit:
     context: BrowserContext
     server: Server
     wrong: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
     expected: str = r"^$"
 
     def open(self, path: str = "/") -> Page:
@@ -35,6 +36,7 @@ class Visit:
         page = self.context.new_page()
         page.on("console", lambda message: self.wrong.append(f"console {message.type}: {message.text}"))
         page.on("pageerror", lambda error: self.wrong.append(f"error: {error}"))
+        page.on("response", self._note)
         page.on("request", lambda request: self._watch(request.url))
         if not self.context.cookies():
             page.goto(f"{self.server.address}/?token={self.server.token}")
@@ -45,8 +47,14 @@ class Visit:
         if not url.startswith((self.server.address, "blob:", "data:")):
             self.wrong.append(f"request to {url}")
 
+    def _note(self, response: Response) -> None:
+        """What the server refused, for the message of a test that fails by it."""
+        if response.status >= 400:
+            self.refused.append(f"{response.status} {response.url} {response.request.post_data}")
+
     def unexpected(self) -> list[str]:
-        return [text for text in self.wrong if not re.search(self.expected, text)]
+        wrong = [text for text in self.wrong if not re.search(self.expected, text)]
+        return [*wrong, *self.refused] if wrong else []
 
 
 def visiting(browser: Browser, server: Server, size: str = "desktop", theme: str = "light") -> Visit:

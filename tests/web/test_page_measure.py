@@ -360,7 +360,7 @@ def test_names_of_strangers_stay_text(visit, examples, tmp_path):
     draw(page, "Known size", (300, 300), (500, 340))
     page.get_by_role("textbox", name="Name", exact=True).fill("<b>bold</b>")
     page.keyboard.press("Tab")
-    expect(page.locator(".rows")).to_contain_text("<b>bold</b>")
+    expect(page.locator("table.rows")).to_contain_text("<b>bold</b>")
     assert page.locator("b").count() == 0
 
 

@@ -53,9 +53,9 @@ export function parse(text: string, unit: string): Typed | null {
   };
 }
 
-/** Whether a text may be a whole quantity, or is one half typed ("200 ±", "-"), which is not worth a question yet. */
+/** Whether a text is a quantity half typed ("200 ±", "-", "0."), which is not worth a question yet. */
 export function halfTyped(text: string): boolean {
-  return /(^|\s)[+-]?$|±\s*$|\(\s*[\w ]*$|\d\.$|e[+-]?$/i.test(text.trimEnd()) && text.trim() !== "";
+  return /(^|\s)[+-]?$|±\s*$|\(\s*[\w ]*$|\d\.$|e[+-]?$|^[+-]?0+[.,]?0*(\s*[a-z]*)?$/i.test(text.trimEnd()) && text.trim() !== "";
 }
 
 const METRES: Record<string, number> = { mm: 1e-3, cm: 1e-2, m: 1, km: 1e3, in: 0.0254, ft: 0.3048, yd: 0.9144 };

@@ -42,6 +42,9 @@ function standInForItsSheet(): void {
   document.head.append(mock);
 }
 
+// it tells the console about tiles of a picture that was left meanwhile, which is nothing to worry about
+(OpenSeadragon as unknown as { console: Record<string, unknown> }).console.warn = () => undefined;
+
 export function viewer(element: HTMLElement): OpenSeadragon.Viewer {
   standInForItsSheet();
   const gestures = { clickToZoom: false, dblClickToZoom: false, flickEnabled: false, pinchRotate: false };
