@@ -40,7 +40,7 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
         found = hashlib.sha256()
         for file in sorted(self.page.rglob("*")):
             inner = file.relative_to(self.page)
-            if file.is_file() and inner.parts[0] != "node_modules":
+            if file.is_file() and inner.parts[0] not in ("node_modules", "tests"):
                 found.update(inner.as_posix().encode() + b"\0" + file.read_bytes())
         return found.hexdigest()
 
