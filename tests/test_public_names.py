@@ -25,6 +25,7 @@ NAMES = [
     "Target",
     "UnknownCameraError",
     "calculate",
+    "calculator_input",
     "measure_lines",
     "measure_markers",
     "propagate",

@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     Array = npt.NDArray[np.float64]
     Bools = npt.NDArray[np.bool_]
     Codes = npt.NDArray[np.int8]
+    Indices = npt.NDArray[np.intp]
     Pixels = npt.NDArray[np.uint8]
 else:
-    Array = Bools = Codes = Pixels = np.ndarray
+    Array = Bools = Codes = Indices = Pixels = np.ndarray
 
-__all__ = ["Array", "Bools", "Codes", "Pixels"]
+__all__ = ["Array", "Bools", "Codes", "Indices", "Pixels"]

@@ -122,5 +122,8 @@ def reasons(shape: tuple[int, ...], *conditions: tuple[Bools, Reason]) -> Codes:
     """(shape) the first reason whose condition holds, OK elsewhere."""
     code = np.zeros(shape, np.int8)
     for where, reason in reversed(conditions):
-        code[np.broadcast_to(where, shape)] = reason
+        np.copyto(code, _NUMBERS[reason], where=where)
     return code
+
+
+_NUMBERS = {reason: np.int8(reason) for reason in Reason}

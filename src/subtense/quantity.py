@@ -64,10 +64,14 @@ class Quantity(Noun):
     core: ClassVar[Mapping[str, int]] = {"value": 0, "u": 0}
 
     def __post_init__(self) -> None:
-        value, u = np.asarray(self.value, float), np.asarray(self.u, float)
-        if not np.all(np.isfinite(value)):
+        if isinstance(self.value, float) and isinstance(self.u, float):  # nearly all, and arrays take their time
+            finite, fine = math.isfinite(self.value), 0 <= self.u < math.inf
+        else:
+            value, u = np.asarray(self.value, float), np.asarray(self.u, float)
+            finite, fine = bool(np.isfinite(value).all()), bool(np.all(np.isfinite(u) & (u >= 0)))
+        if not finite:
             raise InputError("value", self.value, "give finite numbers")
-        if not np.all(np.isfinite(u)) or np.any(u < 0):
+        if not fine:
             raise InputError("u", self.u, "give a finite standard deviation, 0 or above")
         if not self.dof > 0:
             raise InputError("dof", self.dof, "give degrees of freedom above 0")
@@ -143,9 +147,16 @@ class Quantity(Noun):
         Raises:
             InputError: no number, an unknown or unfit unit, or no ± and nothing to assume.
         """
-        return cls(**vars(_Reader(text, unit, bare or unit, name, source).read(assume)))
+        read = _Reader(text, unit, bare or unit, name, source).read(assume)
+        return read if type(read) is cls else cls(**vars(read))
 
     # -- as a noun -------------------------------------------------------------------------------
+
+    @property
+    def leading(self) -> tuple[int, ...]:
+        if isinstance(self.value, float) and isinstance(self.u, float):
+            return ()
+        return super().leading
 
     @property
     def identity(self) -> Hashable:
@@ -153,10 +164,11 @@ class Quantity(Noun):
         return self.id or id(self)
 
     def parts(self) -> tuple[Part, ...]:
-        u = np.asarray(self.u, float)
-        if not np.any(u):
+        if isinstance(self.u, float) and self.u == 0:
             return ()
-        value = np.asarray(self.value, float)
+        u, value = np.asarray(self.u, float), np.asarray(self.value, float)
+        if not u.any():
+            return ()
         part = Part("value", self.source, self.source, value[None], u[None],
                     distributions=(self.distribution,), dof=self.dof)  # fmt: skip
         return (part,)

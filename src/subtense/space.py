@@ -108,7 +108,7 @@ class Space:
     @property
     def leading(self) -> tuple[int, ...]:
         """The leading axes of all nouns, by broadcasting."""
-        return np.broadcast_shapes(*(noun.leading for noun in self.nouns.values()))
+        return np.broadcast_shapes(*{noun.leading for noun in self.nouns.values()})
 
     def rebuilt(self, moved: Moved) -> tuple[Any, ...]:
         """The inputs with moved numbers in place."""

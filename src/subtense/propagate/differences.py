@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Codes
+from ..arrays import Array, Bools, Codes, Indices
 from ..distribution import normal_quantile, t_quantile
 from ..method import Method
 from ..space import Correlations, Line, Moved, Space
@@ -38,7 +39,7 @@ class Propagated:
         u_second_order: (o,) u with the second-order terms of GUM 5.1.2 (quadratic response); None for rows.
         bend: (o, ...) how far an interval end is expected to be off, in u.
         reason: (...) codes of `Reason`.
-        quadratic: u and interval of each output from the quadratic response; empty for rows.
+        quadratic: u and intervals from the quadratic response; None for rows.
         curvature: (l, o) variance that each line's own second differences add; None for rows.
     """
 
@@ -53,7 +54,7 @@ class Propagated:
     u_second_order: Array | None
     bend: Array
     reason: Codes
-    quadratic: tuple[_Bent, ...] = ()
+    quadratic: Quadratic | None = None
     curvature: Array | None = None
 
     @property
@@ -88,46 +89,37 @@ def first_order(
 def scene(model: Model, space: Space, level: float) -> Propagated:
     """One scene: every shifted evaluation in one call, mixed second differences included."""
     m = sum(line.count for line in space.lines)
-    pairs = [(i, j) for i in range(m) for j in range(i)] if m <= PAIRS_UP_TO else []
-    values, reason = evaluate_at(model, space, _offsets(m, pairs))
+    z, (i, j) = _offsets(m)
+    values, reason = evaluate_at(model, space, z)
     y0, plus, minus = values[:, 0], values[:, 1 : m + 1], values[:, m + 1 : 2 * m + 1]
     s = (plus - minus) / 2
-    hessian = _hessian(values, pairs, m)
+    hessian = np.zeros((len(values), m, m))
+    np.einsum("oii->oi", hessian)[...] = plus + minus - 2 * values[:, :1]
+    hessian[:, i, j] = hessian[:, j, i] = values[:, 2 * m + 1 :] - plus[:, i] - plus[:, j] + values[:, :1]
     if m > PAIRS_UP_TO:
         _fill_main_pairs(model, space, s, y0, plus, hessian)
     hessian[abs(hessian) < 1e-12 * abs(y0)[:, None, None]] = 0.0  # rounding, not response
     contributions = _by_line(space.lines, s)
-    u = np.sqrt(np.sum(s**2, axis=1))
-    u2 = np.sqrt(u**2 + np.sum(hessian**2, axis=(1, 2)) / 2)
+    u = np.sqrt((s * s).sum(axis=1))
+    u2 = np.sqrt(u * u + (hessian * hessian).sum(axis=(1, 2)) / 2)
     dof = effective_dof(u, contributions, np.array([line.dof for line in space.lines]))
-    k = np.array([_coverage_factor(level, float(d)) for d in dof])
-    bent = [_quadratic(s[o], hessian[o], space.lines, level) for o in range(len(u))]
-    return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, k, dof,
-                      contributions, s @ s.T, u2, np.array([b.bend for b in bent]), np.asarray(reason[0]),
-                      tuple(bent), _own_curvature(space.lines, hessian))  # fmt: skip
+    quadratic = _quadratic(u, s, hessian, space.lines, level)
+    return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, _coverage_factors(level, dof), dof,
+                      contributions, s @ s.T, u2, quadratic.bend, np.asarray(reason[0]), quadratic,
+                      _own_curvature(space.lines, hessian))  # fmt: skip
 
 
-def _offsets(m: int, pairs: Sequence[tuple[int, int]]) -> Array:
-    """(m, evaluations) standardised deviations: nominal, each variable up, each down, pairs up together."""
-    z = np.zeros((m, 1 + 2 * m + len(pairs)))
-    index = np.arange(m)
-    z[index, 1 + index] = 1.0
-    z[index, 1 + m + index] = -1.0
-    for column, (i, j) in enumerate(pairs, 1 + 2 * m):
-        z[[i, j], column] = 1.0
-    return z
+@lru_cache(maxsize=64)
+def _offsets(m: int) -> tuple[Array, tuple[Indices, Indices]]:
+    """(m, evaluations) standardised deviations: nominal, each variable up, each down, pairs up together; and the pairs.
 
-
-def _hessian(values: Array, pairs: Sequence[tuple[int, int]], m: int) -> Array:
-    """(o, m, m) second differences; mixed ones where there are pairs."""
-    y0, plus, minus = values[:, :1], values[:, 1 : m + 1], values[:, m + 1 : 2 * m + 1]
-    hessian = np.zeros((len(values), m, m))
-    index = np.arange(m)
-    hessian[:, index, index] = plus + minus - 2 * y0
-    for column, (i, j) in enumerate(pairs, 1 + 2 * m):
-        mixed = values[:, column] - plus[:, i] - plus[:, j] + y0[:, 0]
-        hessian[:, i, j] = hessian[:, j, i] = mixed
-    return hessian
+    There are no pairs where the variables are more than PAIRS_UP_TO.
+    """
+    first, second = np.tril_indices(m if m <= PAIRS_UP_TO else 0, -1)
+    one = np.eye(m)
+    z = np.concatenate([np.zeros((m, 1)), one, -one, one[:, first] + one[:, second]], axis=1)
+    z.flags.writeable = False
+    return z, (first, second)
 
 
 def _fill_main_pairs(model: Model, space: Space, s: Array, y0: Array, plus: Array, hessian: Array) -> None:
@@ -147,9 +139,10 @@ def _by_line(lines: Sequence[Line], s: Array) -> Array:
     """(l, o) contributions: signed for a line of one variable, else the root of the summed squares."""
     rows, first = [], 0
     for line in lines:
-        part = s[:, first : first + line.count]
-        rows.append(part[:, 0] if line.count == 1 else np.sqrt(np.sum(part**2, axis=1)))
-        first += line.count
+        count = line.count
+        part = s[:, first : first + count]
+        rows.append(part[:, 0] if count == 1 else np.sqrt((part * part).sum(axis=1)))
+        first += count
     return np.array(rows).reshape(len(lines), len(s))
 
 
@@ -158,15 +151,25 @@ def _own_curvature(lines: Sequence[Line], hessian: Array) -> Array:
 
     A variable z of kurtosis 3 + e has Var(h z^2 / 2) = h^2 (2 + e) / 4.
     """
+    _, kurtosis = _moments(lines)
+    own = np.einsum("oii->io", hessian) ** 2 * ((2 + kurtosis) / 4)[:, None]
     rows, first = [], 0
     for line in lines:
-        block = hessian[:, first : first + line.count, first : first + line.count]
-        excess = np.array([0.0 if law.name == "t" else law.excess_kurtosis for law in line.laws])
-        own = np.einsum("oii->oi", block) ** 2 @ (2 + excess) / 4
-        mixed = (np.sum(block**2, axis=(1, 2)) - np.sum(np.einsum("oii->oi", block) ** 2, axis=1)) / 2
-        rows.append(own + mixed)
-        first += line.count
+        count = line.count
+        row = own[first] if count == 1 else own[first : first + count].sum(axis=0)
+        if count > 1:
+            block = hessian[:, first : first + count, first : first + count]
+            row = row + ((block * block).sum(axis=(1, 2)) - (np.einsum("oii->oi", block) ** 2).sum(axis=1)) / 2
+        rows.append(row)
+        first += count
     return np.array(rows).reshape(len(lines), len(hessian))
+
+
+def _moments(lines: Sequence[Line]) -> tuple[Array, Array]:
+    """(m,) mean and excess kurtosis of each variable; that of t, which may not exist, is left out."""
+    laws = [law for line in lines for law in line.laws]
+    kurtosis = [0.0 if law.name == "t" else law.excess_kurtosis for law in laws]
+    return np.array([law.mean for law in laws]), np.array(kurtosis)
 
 
 def effective_dof(u: Array, contributions: Array, dof: Array) -> Array:
@@ -185,54 +188,64 @@ def _coverage_factor(level: float, dof: float) -> float:
     return t_quantile(0.5 + level / 2, whole)
 
 
+def _coverage_factors(level: float, dof: Array) -> Array:
+    """(o,) the same for each output."""
+    if np.isinf(dof).all():
+        return np.full(len(dof), normal_quantile(0.5 + level / 2))
+    return np.array([_coverage_factor(level, d) for d in dof.tolist()])
+
+
 @dataclass(frozen=True)
-class _Bent:
-    """What the quadratic response says of one output.
+class Quadratic:
+    """What the quadratic response says of the outputs.
 
     Attributes:
-        u: standard deviation.
-        low: lower interval limit, as offset from the nominal value.
-        high: upper interval limit, likewise.
-        bend: the largest distance of these limits from the first-order ones, in first-order u.
-        excess: kurtosis less 3, from the laws of the inputs.
-        active: the variables that move the output at all.
+        u: (o,) standard deviation.
+        low: (o,) lower interval limit, as offset from the nominal value.
+        high: (o,) upper interval limit, likewise.
+        bend: (o,) the largest distance of these limits from the first-order ones, in first-order u.
+        excess: (o,) kurtosis less 3, from the laws of the inputs.
+        active: (o, m) whether a variable moves the output at all.
     """
 
-    u: float
-    low: float
-    high: float
-    bend: float
-    excess: float = 0.0
-    active: tuple[int, ...] = ()
+    u: Array
+    low: Array
+    high: Array
+    bend: Array
+    excess: Array
+    active: Bools
 
 
-def _quadratic(s: Array, hessian: Array, lines: Sequence[Line], level: float) -> _Bent:
+def _quadratic(u: Array, s: Array, hessian: Array, lines: Sequence[Line], level: float) -> Quadratic:
     """Moments of the quadratic response, and its interval by Cornish and Fisher's expansion.
 
     Source: P. Hall, The Bootstrap and Edgeworth Expansion, 2.5.
     """
-    u = float(np.sqrt(np.sum(s**2)))
-    active = tuple(int(i) for i in np.flatnonzero((abs(s) > 1e-6 * u) | np.any(hessian, axis=0)))
-    if not np.all(np.isfinite(s)) or not np.all(np.isfinite(hessian)) or (u == 0 and np.any(hessian)):
-        return _Bent(u, -math.inf, math.inf, math.inf, active=active)
-    if u == 0:
-        return _Bent(0.0, 0.0, 0.0, 0.0)
-    laws = [law for line in lines for law in line.laws]
-    means = np.array([law.mean for law in laws])
-    kurtosis = np.array([0.0 if law.name == "t" else law.excess_kurtosis for law in laws])
-    centred = s**2 * (1 - means**2)
-    mean = float(np.trace(hessian)) / 2 + float(s @ means)
-    variance = float(np.sum(centred) + np.sum(hessian**2) / 2)
-    skew = float(3 * s @ hessian @ s + np.trace(hessian @ hessian @ hessian)) / variance**1.5
-    excess = float(np.sum(centred**2 * kurtosis)) / variance**2
-    z = normal_quantile(0.5 + level / 2)
-    spread = math.sqrt(variance)
-    low, high = (mean + spread * _cornish_fisher(x, skew, excess) for x in (-z, z))
-    return _Bent(spread, low, high, max(abs(low + z * u), abs(high - z * u)) / u, excess, active)
+    bent = hessian.any(axis=1)
+    active = (abs(s) > 1e-6 * u[:, None]) | bent
+    means, kurtosis = _moments(lines)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        centred = s * s * (1 - means**2)
+        squared = hessian @ hessian
+        variance = centred.sum(axis=1) + np.einsum("oii->o", squared) / 2
+        mean = np.einsum("oii->o", hessian) / 2 + s @ means
+        third = 3 * np.einsum("oi,oij,oj->o", s, hessian, s) + np.einsum("oij,oij->o", squared, hessian)
+        spread, excess = np.sqrt(variance), centred**2 @ kurtosis / variance**2
+        skew = third / (variance * spread)
+        z = normal_quantile(0.5 + level / 2)
+        low, high = (mean + spread * _cornish_fisher(x, skew, excess) for x in (-z, z))
+        bend = np.maximum(abs(low + z * u), abs(high - z * u)) / u
+    known = np.isfinite(s).all(axis=1) & np.isfinite(bend) & (u > 0)
+    if not known.all():
+        still = (u == 0) & ~np.any(bent, axis=1)
+        open_ = np.where(still, 0.0, np.inf)
+        spread, low, high = (np.where(known, a, b) for a, b in ((spread, u), (low, -open_), (high, open_)))
+        bend, excess = np.where(known, bend, open_), np.where(known, excess, 0.0)
+    return Quadratic(spread, low, high, bend, excess, active)
 
 
-def _cornish_fisher(z: float, skew: float, excess: float) -> float:
-    """Quantile of a standardised law near the normal one."""
+def _cornish_fisher(z: float, skew: Array, excess: Array) -> Array:
+    """(o,) quantiles of standardised laws near the normal one."""
     return z + (z * z - 1) * skew / 6 + (z**3 - 3 * z) * excess / 24 - (2 * z**3 - 5 * z) * skew**2 / 36
 
 

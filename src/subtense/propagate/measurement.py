@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..arrays import Array
+from ..distribution import Distribution
 from ..errors import GeometryError, InputError
 from ..method import Method, Output, Reason
 from ..quantity import Contribution, Measurement, Note
@@ -57,25 +59,12 @@ def measure(
         raise GeometryError(reason.text, code=reason.name.lower())
     result = method.function(inputs, *((method.start(inputs),) if method.start else ()))
     notes = method.notes(inputs, result)
-    answers = [
-        _without_draws(model, space, nominal, o, level, output.digits) for o, output in enumerate(method.outputs)
-    ]
-    bent = [o for o, answer in enumerate(answers) if answer is None]
-    drawn = None
-    if bent:
-        from .draws import adaptive, sample_space  # many measurements need none
-
-        digits = max(method.outputs[o].digits for o in bent)
-        fixed = None if draws is None else sample_space(model, space, draws, np.random.default_rng(seed))
-        drawn = fixed or adaptive(model, space, level, seed, bent, digits)
-    found = []
-    for o, output in enumerate(method.outputs):
-        answer = answers[o]
-        if answer is None:
-            assert drawn is not None
-            answer = _drawn(drawn, o, level, output)
-        found.append(_measurement(method, output, nominal, o, answer, space, level, label, notes, given or {}))
-    return tuple(found)
+    answers = _answers(method, model, space, nominal, level, seed, draws)
+    budgets = _budgets(space.lines, nominal, answers)
+    return tuple(
+        _measurement(output, value, answer, budget, method.name, level, label, notes, given or {})
+        for output, value, answer, budget in zip(method.outputs, nominal.value.tolist(), answers, budgets, strict=True)
+    )
 
 
 @dataclass(frozen=True)
@@ -89,43 +78,83 @@ class _Answer:
     notes: tuple[Note, ...] = ()
 
 
-def _without_draws(
-    model: Model, space: Space, nominal: Propagated, o: int, level: float, digits: int
-) -> _Answer | None:
+def _answers(
+    method: Method, model: Model, space: Space, nominal: Propagated, level: float, seed: int, draws: int | None
+) -> list[_Answer]:
+    """One for each output, by draws where nothing cheaper will do."""
+    mapped = _Mapped(model, space, level)
+    found: dict[int, _Answer] = {}
+    for o, output in enumerate(method.outputs):
+        answer = _without_draws(nominal, o, output.digits, mapped)
+        if answer is not None:
+            found[o] = answer
+    bent = [o for o in range(len(method.outputs)) if o not in found]
+    if bent:
+        from .draws import adaptive, sample_space  # many measurements need none
+
+        digits = max(method.outputs[o].digits for o in bent)
+        fixed = None if draws is None else sample_space(model, space, draws, np.random.default_rng(seed))
+        drawn = fixed or adaptive(model, space, level, seed, bent, digits)
+        found |= {o: _drawn(drawn, o, level, method.outputs[o]) for o in bent}
+    return [found[o] for o in range(len(method.outputs))]
+
+
+def _without_draws(nominal: Propagated, o: int, digits: int, mapped: _Mapped) -> _Answer | None:
     """The answer of the cheapest evaluation that keeps the tolerance of JCGM 101, 8.2; None where draws are needed."""
-    u, bend = float(nominal.u[o]), float(nominal.bend[o])
+    value, u, bend = float(nominal.value[o]), float(nominal.u[o]), float(nominal.bend[o])
     allowed = tolerance(u, digits) / u if u > 0 else 0.0
     if bend <= allowed:
-        return _Answer(u, float(nominal.low[o]), float(nominal.high[o]))
-    quadratic, value = nominal.quadratic[o], float(nominal.value[o])
-    if len(quadratic.active) == 1:
-        mapped = _mapped(model, space, o, quadratic.active[0], level)
-        if mapped:
-            return mapped
+        half = float(nominal.coverage[o]) * u
+        return _Answer(u, value - half, value + half)
+    quadratic = nominal.quadratic
+    assert quadratic is not None
+    active = np.flatnonzero(quadratic.active[o])
+    if len(active) == 1:
+        found = mapped.answer(o, int(active[0]))
+        if found:
+            return found
     # what the quadratic response leaves out is of the next order, and the expansion is for nearly normal sums
-    if bend**2 <= allowed and abs(quadratic.excess) < NEARLY_NORMAL and math.isinf(float(nominal.dof[o])):
-        return _Answer(quadratic.u, value + quadratic.low, value + quadratic.high, "second order")
+    if bend**2 <= allowed and abs(quadratic.excess[o]) < NEARLY_NORMAL and math.isinf(nominal.dof[o]):
+        low, high = value + float(quadratic.low[o]), value + float(quadratic.high[o])
+        return _Answer(float(quadratic.u[o]), low, high, "second order")
     return None
 
 
-def _mapped(model: Model, space: Space, output: int, variable: int, level: float) -> _Answer | None:
-    """The interval of the single uncertain input taken through a monotone response; None where it is not monotone."""
-    laws = [law for line in space.lines for law in line.laws]
+INSIDE, SPREAD = 33, 1000
+"""Quantiles of the single uncertain input that show whether the response is monotone, and those that give u."""
 
-    def through(shares: Array) -> Array:
-        z = np.zeros((len(laws), len(shares)))
-        z[variable] = [laws[variable].quantile(float(share)) for share in shares]
-        return np.asarray(evaluate_at(model, space, z)[0][output])
 
-    values = through(np.linspace((1 - level) / 2, (1 + level) / 2, 33))
-    step = np.diff(values)
-    if not np.all(np.isfinite(values)) or not (np.all(step > 0) or np.all(step < 0)):
-        return None
-    spread = through(np.linspace(0.0005, 0.9995, 1000))
-    how = "mapped through the one uncertain input"
-    if np.all(np.isfinite(spread)):
-        return _Answer(float(np.std(spread)), float(values.min()), float(values.max()), how)
-    return _Answer(None, float(values.min()), float(values.max()), how, (_HEAVY_TAIL,))
+class _Mapped:
+    """The quantiles of single uncertain inputs taken through the response, once for all outputs."""
+
+    def __init__(self, model: Model, space: Space, level: float) -> None:
+        self.model, self.space, self.level = model, space, level
+        self.laws = [law for line in space.lines for law in line.laws]
+        self.through: dict[int, Array] = {}
+
+    def answer(self, output: int, variable: int) -> _Answer | None:
+        """The interval of the input through a monotone response; None where it is not monotone."""
+        if variable not in self.through:
+            law = self.laws[variable]
+            z = np.zeros((len(self.laws), INSIDE + SPREAD))
+            z[variable, :INSIDE] = _quantiles(law, (1 - self.level) / 2, (1 + self.level) / 2, INSIDE)
+            z[variable, INSIDE:] = _quantiles(law, 0.0005, 0.9995, SPREAD)
+            self.through[variable] = evaluate_at(self.model, self.space, z)[0]
+        values, spread = np.split(self.through[variable][output], [INSIDE])
+        step = np.diff(values)
+        if not np.isfinite(values).all() or not ((step > 0).all() or (step < 0).all()):
+            return None
+        low, high = sorted((float(values[0]), float(values[-1])))
+        how = "mapped through the one uncertain input"
+        if np.isfinite(spread).all():
+            return _Answer(float(np.std(spread)), low, high, how)
+        return _Answer(None, low, high, how, (_HEAVY_TAIL,))
+
+
+@lru_cache(maxsize=64)
+def _quantiles(law: Distribution, low: float, high: float, count: int) -> Array:
+    """Of a law, between two shares; not to be written to."""
+    return np.array([law.quantile(share) for share in np.linspace(low, high, count).tolist()])
 
 
 CURE = "make the pixel extent larger or better known: come closer, use a longer lens or a larger object"
@@ -168,40 +197,46 @@ def _heavy(values: Array) -> bool:
 
 
 def _measurement(
-    method: Method, output: Output, nominal: Propagated, o: int, answer: _Answer, space: Space, level: float,
-    label: str, notes: tuple[Note, ...], given: Mapping[str, Any],
+    output: Output, value: float, answer: _Answer, budget: tuple[Contribution, ...], method: str, level: float, label: str,
+    notes: tuple[Note, ...], given: Mapping[str, Any],
 ) -> Measurement:  # fmt: skip
     def limit(x: float) -> float | None:
         if output.nonnegative:  # no length is below 0, whatever a symmetric interval says
             x = max(x, 0.0) if x > -math.inf else 0.0
         return x if math.isfinite(x) else None
 
-    curvature = nominal.curvature[:, o] if nominal.curvature is not None and answer.evaluation != "first order" else 0.0
-    budget = _budget(space.lines, nominal.contributions[:, o], curvature, answer.u)
-    value = float(nominal.value[o])
     # a one-sided doubt puts the value at an end of what is possible; the interval is never without it
     low, high = min(answer.low, value), max(answer.high, value)
     return Measurement(
         output.what, value, answer.u, limit(low), limit(high), output.unit,
-        method.name, level, label, answer.evaluation, budget, notes + answer.notes, given=given,
+        method, level, label, answer.evaluation, budget, notes + answer.notes, given=given,
     )  # fmt: skip
 
 
-def _budget(
-    lines: Sequence[Line], contributions: Array, curvature: Array | float, u: float | None
-) -> tuple[Contribution, ...]:
-    """Lines with their shares, largest first.
+def _budgets(
+    lines: Sequence[Line], nominal: Propagated, answers: Sequence[_Answer]
+) -> Iterator[tuple[Contribution, ...]]:
+    """Of each output: lines with their shares, largest first.
 
     A line's variance is its first-order one and that of its own curvature; `interaction` takes what draws have beyond.
     """
-    squared = np.nan_to_num(contributions**2 + curvature)
-    own = float(np.sum(squared))
+    assert nominal.curvature is not None
+    bent = np.array([answer.evaluation != "first order" for answer in answers])
+    squared = np.nan_to_num(nominal.contributions**2 + nominal.curvature * bent)
+    for answer, signed, own in zip(answers, nominal.contributions.T.tolist(), squared.T.tolist(), strict=True):
+        yield _budget(lines, signed, own, answer.u)
+
+
+def _budget(
+    lines: Sequence[Line], signed: Sequence[float], squared: Sequence[float], u: float | None
+) -> tuple[Contribution, ...]:
+    own = sum(squared)
     total = max(u**2 if u is not None else 0.0, own)
     if not total > 0:
         return ()
     found = [
-        Contribution(line.name, line.source, math.copysign(math.sqrt(q), c), float(q / total))
-        for line, c, q in zip(lines, contributions, squared, strict=True)
+        Contribution(line.name, line.source, math.copysign(math.sqrt(q), c), q / total)
+        for line, c, q in zip(lines, signed, squared, strict=True)
         if q > 0
     ]
     rest = total - own

@@ -2,11 +2,43 @@
 
 from __future__ import annotations
 
-import json
+import math
+from json.encoder import encode_basestring
+from typing import Any
 
 from ..document import Document
 
 
 def report(document: Document) -> str:
-    """The document as indented JSON."""
-    return json.dumps(document.to_json(), indent=2, ensure_ascii=False, allow_nan=False)
+    """The document as indented JSON, two spaces a level."""
+    return _text(document.to_json(), "\n", {})
+
+
+def _text(value: Any, line: str, written: dict[tuple[int, str], str]) -> str:
+    """What `json.dumps` gives with `indent=2, ensure_ascii=False, allow_nan=False`, several times as fast.
+
+    Args:
+        value: plain Python data.
+        line: a line break and the indentation that the value stands in.
+        written: the text of each object by identity and place: all measurements of a scene hold the same inputs.
+    """
+    if isinstance(value, str):
+        return encode_basestring(value)
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{value} has no place in JSON")
+        return float.__repr__(value)
+    if value is None or value is True or value is False:
+        return {None: "null", True: "true", False: "false"}[value]
+    if isinstance(value, int):
+        return int.__repr__(value)
+    inner = f"{line}  "
+    if isinstance(value, dict):
+        if (id(value), line) not in written:
+            items = [f"{encode_basestring(key)}: {_text(item, inner, written)}" for key, item in value.items()]
+            written[id(value), line] = f"{{{inner}{f',{inner}'.join(items)}{line}}}" if items else "{}"
+        return written[id(value), line]
+    if isinstance(value, (list, tuple)):
+        items = [_text(item, inner, written) for item in value]
+        return f"[{inner}{f',{inner}'.join(items)}{line}]" if items else "[]"
+    raise TypeError(f"{type(value).__name__} has no place in JSON")

@@ -11,9 +11,10 @@ from .. import propagate
 from ..arrays import Array
 from ..document import Document
 from ..errors import GeometryError, InputError
+from ..method import Method
 from ..methods import calculator
 from ..noun import fields_of
-from ..quantity import Measurement, Quantity
+from ..quantity import Quantity
 from .given import given
 from .improve import improved
 
@@ -41,33 +42,36 @@ def calculate(
     """
     _check(inputs, image_height)
     unknown = inputs.unknown
-    found = propagate.measure(calculator.METHOD, inputs, level=level, seed=seed, given=given(inputs))
-    by_name = dict(zip((o.name for o in calculator.METHOD.outputs), found, strict=True))
-    _check_answer(by_name, inputs, image_height)
-    chosen = [by_name[name] for name in dict.fromkeys((_FIELD_OF[unknown], *_ALWAYS))]
-    return Document(improved(tuple(_headed(chosen))), _camera(by_name))
+    method = _ANSWERING[unknown]
+    found = propagate.measure(method, inputs, level=level, seed=seed, given=given(inputs))
+    values = {name: float(q.value) for name in calculator.UNKNOWNS if (q := getattr(inputs, name)) is not None}
+    values[unknown] = found[0].value
+    _check_answer(values, inputs, image_height)
+    f = found[[output.name for output in method.outputs].index("focal_length_px")]
+    camera = {"f_px": f.value, "u_f_px": f.u, "width_px": round(values["image_width"]), "height_px": None,
+              "source": "the relation between focal length, sensor and picture"}  # fmt: skip
+    # the notes stand with the headline only: they are the same for all
+    return Document(improved((found[0], *(dataclasses.replace(m, notes=()) for m in found[1:]))), camera)
 
 
-def _headed(measurements: list[Measurement]) -> list[Measurement]:
-    """The notes stand with the headline only: they are the same for all."""
-    head, *rest = measurements
-    return [head, *(dataclasses.replace(m, notes=()) for m in rest)]
+def _answering(unknown: str) -> Method:
+    """The calculator with the outputs that are shown: the unknown, and what lies between; the others were given."""
+    names = dict.fromkeys((_FIELD_OF[unknown], *_ALWAYS))
+    outputs = {output.name: output for output in calculator.METHOD.outputs}
+    return dataclasses.replace(calculator.METHOD, outputs=tuple(outputs[name] for name in names))
 
 
-def _camera(found: dict[str, Measurement]) -> dict[str, Any]:
-    f = found["focal_length_px"]
-    return {"f_px": f.value, "u_f_px": f.u, "width_px": round(found["image_width_px"].value), "height_px": None,
-            "source": "the relation between focal length, sensor and picture"}  # fmt: skip
+_ANSWERING = {unknown: _answering(unknown) for unknown in calculator.UNKNOWNS}
 
 
-def _check_answer(found: dict[str, Measurement], inputs: calculator.Inputs, image_height: Quantity | None) -> None:
+def _check_answer(values: dict[str, float], inputs: calculator.Inputs, image_height: Quantity | None) -> None:
     """Refuse what no camera sees: an object inside the focal length, or one that does not fit into the picture."""
-    distance, focal, extent = (found[name].value for name in ("distance_m", "focal_length_m", "extent_px"))
+    distance, focal, extent = (values[name] for name in ("distance", "focal_length", "extent"))
     if distance <= focal:
         text = f"at {distance * 1000:g} mm the object lies inside the focal length of {focal * 1000:.4g} mm; no lens draws it"
         raise GeometryError(text, code="inside_focal_length")
     height = None if image_height is None else float(image_height.value)
-    limit = found["image_width_px"].value if inputs.along == "width" else height
+    limit = values["image_width"] if inputs.along == "width" else height
     if limit is not None and extent > limit:
         text = f"the object would span {extent:.0f} px, and the picture has {limit:.7g} px along its {inputs.along}"
         raise GeometryError(text, code="out_of_picture")
