@@ -471,6 +471,13 @@ def test_the_child_reaches_no_network_or_process_by_another_door():
     assert in_child(code) == "1 1 1 1 1 1"
 
 
+@linux
+def test_the_child_ends_when_the_server_does():
+    """Whatever it is at: PR_GET_PDEATHSIG says SIGKILL."""
+    code = "import ctypes\nfound = ctypes.c_int()\nctypes.CDLL(None).prctl(2, ctypes.byref(found), 0, 0, 0)\nprint(found.value)"
+    assert in_child(code) == "9"
+
+
 def test_the_child_writes_no_large_file_and_opens_not_many(tmp_path):
     assert in_child("print(tried(lambda: open('a', 'wb').write(bytes(2 * 10**6))))", tmp_path) == "27"  # EFBIG
     assert in_child("print(tried(lambda: [open('/dev/null') for _ in range(100)]))") == "24"  # EMFILE
