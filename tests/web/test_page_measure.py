@@ -391,3 +391,30 @@ def test_help_opens_by_its_key(visit, examples):
     expect(page.get_by_role("dialog")).to_contain_text("Ctrl+Z")
     page.keyboard.press("Escape")
     expect(page.get_by_role("dialog")).to_have_count(0)
+
+
+def test_two_fingers_zoom(browser, server, examples):
+    visit = visiting(browser, server, "phone")
+    page = opened(visit, examples / "desk.jpg")
+    page.get_by_role("button", name="Known size", exact=True).click()
+    box = page.get_by_test_id("stage").bounding_box()
+    for x in (150, 230):
+        page.touchscreen.tap(box["x"] + x, box["y"] + 150)
+        page.wait_for_timeout(100)
+    first, second = page.locator("[data-handle='A-ends-0']"), page.locator("[data-handle='A-ends-1']")
+    before = second.bounding_box()["x"] - first.bounding_box()["x"]
+    session = visit.context.new_cdp_session(page)
+
+    def touch(kind: str, apart: float) -> None:
+        points = [] if kind == "touchEnd" else [{"x": 190 - apart, "y": box["y"] + 90, "id": 0}, {"x": 190 + apart, "y": box["y"] + 90, "id": 1}]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", 30)
+    for step in range(10):
+        touch("touchMove", 30 + 5 * step)
+        page.wait_for_timeout(20)
+    touch("touchEnd", 0)
+    page.wait_for_timeout(600)
+    assert second.bounding_box()["x"] - first.bounding_box()["x"] > 1.5 * before
+    visit.context.close()
+    assert visit.unexpected() == []
