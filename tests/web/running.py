@@ -1,5 +1,6 @@
 """Runs the real server in a process of its own, and asks it."""
 
+import asyncio
 import contextlib
 import io
 import json
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -178,6 +180,12 @@ def answers(port: int) -> bool:
         return httpx.get(f"http://127.0.0.1:{port}/", timeout=1).status_code > 0
     except httpx.HTTPError:
         return False
+
+
+def awaited(coroutine):
+    """Its outcome, from a thread of its own: a browser's loop may run in this one."""
+    with ThreadPoolExecutor(1) as threads:
+        return threads.submit(asyncio.run, coroutine).result()
 
 
 def until(what, seconds: float = 60.0) -> bool:

@@ -1,6 +1,5 @@
 """Each limit on what is sent: it holds, the error has its name, and the server goes on."""
 
-import asyncio
 import io
 import json
 import shutil
@@ -15,7 +14,7 @@ from pathlib import Path
 import httpx
 import pytest
 from PIL import Image
-from running import picture, read_answer, serving, until
+from running import awaited, picture, read_answer, serving, until
 
 from subtense.web import photos
 from subtense.web.bodies import depth_over
@@ -294,7 +293,7 @@ def few(tmp_path):
     def add(seed: int, kept: bool = False) -> str:
         file = tmp_path / f"{seed}.png"
         file.write_bytes(picture(50, 40, seed=seed))
-        return asyncio.run(found.add(file, file.name, kept=kept)).id
+        return awaited(found.add(file, file.name, kept=kept)).id
 
     yield found, add
     found.close()

@@ -1,15 +1,13 @@
 """Every row of the table of what the server answers, on a page, a POST, a file, and an upgrade to WebSocket."""
 
-import asyncio
 import json
 import os
 import re
 import subprocess
-from pathlib import Path
 
 import httpx
 import pytest
-from running import STATIC, Server, command, free_port, needs_page, picture, serving
+from running import STATIC, Server, awaited, command, free_port, needs_page, picture, serving
 
 from subtense.web.app import create_app
 from subtense.web.settings import Settings
@@ -273,7 +271,7 @@ def test_an_asgi_websocket_is_closed_before_it_opens():
         "query_string": b"",
         "scheme": "ws",
     }
-    asyncio.run(create_app(Settings("t" * 32))(scope, receive, send))
+    awaited(create_app(Settings("t" * 32))(scope, receive, send))
     assert [message["type"] for message in said] == ["websocket.close"]
 
 
@@ -340,7 +338,7 @@ def test_an_answer_to_a_failure_has_them_too_and_tells_nothing():
         async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:8517") as client:
             return await client.get("/api/broken", headers={"authorization": "Bearer " + "t" * 32})
 
-    answer = asyncio.run(ask())
+    answer = awaited(ask())
     app.state.subtense.photos.close()
     assert answer.status_code == 500 and answer.json()["error"]["type"] == "Failure"
     assert "secret" not in answer.text
@@ -455,23 +453,17 @@ def test_the_form_lets_in(server):
     assert answer.get("set-cookie").startswith(f"subtense_{server.port}={server.token};")
 
 
-def test_the_form_lets_in_from_a_real_browser(server):
+def test_the_form_lets_in_from_a_real_browser(server, browser):
     """What a browser sends as Origin depends on the policy of the page that the form is in."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    chromium = Path("/usr/bin/chromium")
-    if not chromium.exists():
-        pytest.skip("no Chromium on this machine")
-    with playwright.sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=str(chromium), args=["--no-sandbox"])
-        page = browser.new_page()
-        page.goto(f"{server.address}/")
-        page.get_by_label("Token").fill(server.token)
-        with page.expect_response(lambda r: r.request.method == "POST") as posted:
-            page.get_by_role("button").click()
-        assert posted.value.status == 303
-        names = {cookie["name"]: cookie for cookie in page.context.cookies()}
-        assert names[f"subtense_{server.port}"]["httpOnly"] and page.url == f"{server.address}/"
-        browser.close()
+    page = browser.new_page()
+    page.goto(f"{server.address}/")
+    page.get_by_label("Token").fill(server.token)
+    with page.expect_response(lambda r: r.request.method == "POST") as posted:
+        page.get_by_role("button").click()
+    assert posted.value.status == 303
+    names = {cookie["name"]: cookie for cookie in page.context.cookies()}
+    assert names[f"subtense_{server.port}"]["httpOnly"] and page.url == f"{server.address}/"
+    page.close()
 
 
 # -- other machines --------------------------------------------------------------------------------------
