@@ -1,6 +1,8 @@
 import csv
 import io
+import json
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -8,6 +10,7 @@ from subtense.document import Document, Shape
 from subtense.photo import Photo
 from subtense.quantity import Contribution, Measurement, Note
 from subtense.reports import csv as csv_report
+from subtense.reports import json as json_report
 from subtense.reports import overlay, text
 from subtense.reports.rounding import grouped, number
 
@@ -63,6 +66,29 @@ def test_the_report_has_budget_notes_and_cures():
     shown = text.report(Document((measurement(notes=(Note("a_code", "a doubt", "a cure"),), improve="use a tape"),)))
     for part in ("tape", "80 %", "clicks", "20 %", "note a_code: a doubt; a cure", "to improve it: use a tape"):
         assert part in shown
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {}, {"a": {"value": 1.0, "points": [[1.0, 2.5e-7], []], "none": None, "yes": True, "no": False, "n": -3}, "b": {}},
+        {"text": "±°\"\\\n\u2028\x00😀", "np": np.float64(0.1), "big": 1e22, "small": -5e-324, "tuple": (1, 2)},
+    ],
+)  # fmt: skip
+def test_json_is_what_the_standard_library_writes(given):
+    shared = {"one": {"deep": [given, given]}, "two": given}
+    document = Document(
+        (measurement(given=shared), measurement(given=shared, u=None, label="é")), {"f_px": 1.5, "hypotheses": []}
+    )
+    wanted = json.dumps(document.to_json(), indent=2, ensure_ascii=False, allow_nan=False)
+    assert json_report.report(document) == wanted
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), float("inf"), np.float64("nan"), {1, 2}, np.int64(3), b"x"])
+def test_json_has_no_place_for_what_is_not_plain(wrong):
+    for given in ({"x": wrong}, {"x": [wrong]}):
+        with pytest.raises((ValueError, TypeError)):
+            json_report.report(Document((measurement(given=given),)))
 
 
 def test_csv_is_read_back_and_no_formula_reaches_a_spreadsheet():

@@ -12,12 +12,14 @@ import dataclasses
 import json
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
 from .arrays import Array
 from .distribution import Distribution
+
+One = TypeVar("One")
 
 
 @dataclass(frozen=True)
@@ -105,11 +107,16 @@ class Noun(abc.ABC):
 
     def _with(self, **changes: Any) -> Self:
         """A copy with fields replaced and the constructor's checks left out (draws may leave the allowed range)."""
-        new = object.__new__(type(self))
-        new.__dict__.update(self.__dict__)
+        new = unchecked(self, **changes)
         new.__dict__.pop("digest", None)
-        new.__dict__.update(changes)
         return new
+
+
+def unchecked(one: One, **changes: Any) -> One:
+    """A copy of a frozen dataclass with fields replaced, without its constructor; several times as fast."""
+    new = object.__new__(type(one))
+    new.__dict__.update(one.__dict__, **changes)
+    return new
 
 
 def plain(value: Any) -> Any:

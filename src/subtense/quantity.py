@@ -387,5 +387,6 @@ class Measurement:
             "what": self.what, "label": self.label, "value": self.value, "unit": self.unit, "u": self.u,
             "low": self.low, "high": self.high, "level": self.level, "method": self.method,
             "evaluation": self.evaluation, "budget": [c.to_json() for c in self.budget],
-            "notes": [n.to_json() for n in self.notes], "improve": self.improve, "given": dict(self.given),
+            "notes": [n.to_json() for n in self.notes], "improve": self.improve,
+            "given": self.given if isinstance(self.given, dict) else dict(self.given),
         }  # fmt: skip

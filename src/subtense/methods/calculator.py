@@ -9,8 +9,7 @@ share of that which is added (0, and up to 1 as a one-sided limit, where the cla
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from ..errors import InputError
 from ..focus import classical, close_focus
 from ..geometry import segment_depth
 from ..method import Method, Output, Reason, reasons
+from ..noun import unchecked
 from ..quantity import Note, Quantity
 
 UNKNOWNS = ("distance", "size", "extent", "focal_length", "sensor_width", "image_width")
@@ -183,9 +183,9 @@ def _seen_focal(s: _Scene, z: Array) -> Array:
 def _focal(s: _Scene) -> Array:
     """Z = D - focus f holds the unknown itself: a fixed point, which gains a factor f / D each time."""
     assert s.distance is not None
-    f = np.zeros(())
+    f, pitch = np.zeros(()), s.pitch
     for _ in range(12):
-        f = _seen_focal(s, s.distance - s.focus * f) * s.pitch
+        f = _seen_focal(s, s.distance - s.focus * f) * pitch
     return np.asarray(f)
 
 
@@ -213,12 +213,12 @@ def calculator(inputs: Inputs) -> Result:
     given, unknown = _scene(inputs), inputs.unknown
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         solved = _SOLVERS[unknown](given)
-        changed: dict[str, Any] = {_FIELDS[unknown]: solved}
-        s = replace(given, **changed)
+        s = unchecked(given, **{_FIELDS[unknown]: solved})
         focal, size, extent, distance, sensor = s.focal, s.size, s.extent, s.distance, s.sensor
         assert focal is not None and size is not None and extent is not None and distance is not None
         assert sensor is not None and s.image is not None
-        f = focal / s.pitch
+        pitch = s.pitch
+        f = focal / pitch
         bx, by, ax, ay = s.ox / f, s.oy / f, s.ex * extent / f, s.ey * extent / f
         step = size * s.sine / 4 / distance  # the middle of the 3-D segment: Z b + (half step) a / 2
         range_m = distance * np.sqrt(1 + (bx + step * ax) ** 2 + (by + step * ay) ** 2)
@@ -226,11 +226,11 @@ def calculator(inputs: Inputs) -> Result:
         angle = _angle(bx - ax / 2, by - ay / 2, bx + ax / 2, by + ay / 2)
         per_px = size / extent
     code = reasons(
-        np.broadcast_shapes(range_m.shape, angle.shape), (~(focal > 0), Reason.OUT_OF_RANGE),
-        (~(size > 0), Reason.OUT_OF_RANGE), (~(s.pitch > 0), Reason.OUT_OF_RANGE), (extent == 0, Reason.ZERO_EXTENT),
-        (~(extent > 0), Reason.OUT_OF_RANGE), (~np.isfinite(solved), Reason.TOO_OBLIQUE), (~(distance > 0), Reason.BEHIND_CAMERA),
+        np.broadcast_shapes(range_m.shape, angle.shape), (~((focal > 0) & (size > 0) & (pitch > 0)), Reason.OUT_OF_RANGE),
+        (extent == 0, Reason.ZERO_EXTENT), (~(extent > 0), Reason.OUT_OF_RANGE), (~np.isfinite(solved), Reason.TOO_OBLIQUE),
+        (~(distance > 0), Reason.BEHIND_CAMERA),
     )  # fmt: skip
-    return Result(distance, range_m, size, extent, focal, sensor, s.image, f, 1 / s.pitch, per_px, view, angle, code)
+    return Result(distance, range_m, size, extent, focal, sensor, s.image, f, 1 / pitch, per_px, view, angle, code)
 
 
 def _angle(x1: Array, y1: Array, x2: Array, y2: Array) -> Array:

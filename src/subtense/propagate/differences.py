@@ -224,12 +224,12 @@ def _quadratic(u: Array, s: Array, hessian: Array, lines: Sequence[Line], level:
     bent = hessian.any(axis=1)
     active = (abs(s) > 1e-6 * u[:, None]) | bent
     means, kurtosis = _moments(lines)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         centred = s * s * (1 - means**2)
         squared = hessian @ hessian
-        variance = centred.sum(axis=1) + np.einsum("oii->o", squared) / 2
-        mean = np.einsum("oii->o", hessian) / 2 + s @ means
-        third = 3 * np.einsum("oi,oij,oj->o", s, hessian, s) + np.einsum("oij,oij->o", squared, hessian)
+        variance = centred.sum(axis=1) + squared.trace(0, 1, 2) / 2
+        mean = hessian.trace(0, 1, 2) / 2 + s @ means
+        third = 3 * np.einsum("oi,oij,oj->o", s, hessian, s) + (squared * hessian).sum(axis=(1, 2))
         spread, excess = np.sqrt(variance), centred**2 @ kurtosis / variance**2
         skew = third / (variance * spread)
         z = normal_quantile(0.5 + level / 2)

@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Codes
+from ..arrays import Array, Bools, Codes
 from ..method import Method, Reason
 from ..space import Correlations, Moved, Space
 from .differences import tolerance
@@ -45,12 +46,13 @@ class Draws:
     @property
     def mean(self) -> Array:
         """(o,) means of the draws that have an answer."""
-        return np.asarray(np.nanmean(self.values, axis=1))
+        return np.asarray(np.nanmean(self.values, axis=1) if self.lost.any() else self.values.mean(axis=1))
 
-    @property
+    @cached_property
     def u(self) -> Array:
         """(o,) standard deviations."""
-        return np.asarray(np.nanstd(self.values, axis=1, ddof=1))
+        deviation = np.nanstd if self.lost.any() else np.std
+        return np.asarray(deviation(self.values, axis=1, ddof=1))
 
     @property
     def cov(self) -> Array:
@@ -74,10 +76,20 @@ class Draws:
         first = int(np.argmin(width))
         return float(values[first]), float(values[first + inside - 1])
 
-    @property
+    @cached_property
     def unanswered(self) -> Array:
         """(o,) the share of draws without an answer."""
-        return np.asarray(np.mean(~np.isfinite(self.values), axis=1))
+        return np.asarray(np.mean(self.lost, axis=1))
+
+    @cached_property
+    def lost(self) -> Bools:
+        """(o, n) whether a draw has no answer."""
+        return np.asarray(~np.isfinite(self.values))
+
+    def of(self, outputs: Sequence[int]) -> Draws:
+        """The draws of some outputs."""
+        chosen = list(outputs)
+        return Draws(tuple(self.names[o] for o in chosen), self.values[chosen], self.reason, self.stable)
 
 
 def _sorted_ends(values: Array, reason: Codes) -> tuple[Array, Array]:
@@ -126,21 +138,20 @@ def monte_carlo(
 def adaptive(
     model: Model, space: Space, level: float, seed: int, wanted: Sequence[int] | None = None, digits: int = 2
 ) -> Draws:
-    """Blocks of draws until the statistics of the wanted outputs (all by default) are steady."""
-    outputs = list(range(len(model.names)) if wanted is None else wanted)
+    """Blocks of draws of the wanted outputs (all by default) until their statistics are steady."""
     rng = np.random.default_rng(seed)
     blocks: list[Draws] = []
     statistics: list[Array] = []
     while True:
         block = sample_space(model, space, BLOCK, rng)
+        block = block if wanted is None else block.of(wanted)
         blocks.append(block)
-        ends = np.array([block.interval(o, level) for o in outputs])
-        chosen = Draws(block.names, block.values[outputs], block.reason)
-        statistics.append(np.stack([chosen.mean, chosen.u, ends[:, 0], ends[:, 1]]))
+        ends = np.array([block.interval(o, level) for o in range(len(block.names))])
+        statistics.append(np.stack([block.mean, block.u, ends[:, 0], ends[:, 1]]))
         stable = len(blocks) >= FEWEST_BLOCKS and _steady(np.stack(statistics), digits)
         if stable or len(blocks) * BLOCK >= model.most_draws:
             values = np.concatenate([b.values for b in blocks], axis=1)
-            return Draws(model.names, values, np.concatenate([b.reason for b in blocks]), stable)
+            return Draws(block.names, values, np.concatenate([b.reason for b in blocks]), stable)
 
 
 def _steady(statistics: Array, digits: int) -> bool:

@@ -93,9 +93,9 @@ def _answers(
         from .draws import adaptive, sample_space  # many measurements need none
 
         digits = max(method.outputs[o].digits for o in bent)
-        fixed = None if draws is None else sample_space(model, space, draws, np.random.default_rng(seed))
+        fixed = None if draws is None else sample_space(model, space, draws, np.random.default_rng(seed)).of(bent)
         drawn = fixed or adaptive(model, space, level, seed, bent, digits)
-        found |= {o: _drawn(drawn, o, level, method.outputs[o]) for o in bent}
+        found |= {o: _drawn(drawn, row, level, method.outputs[o]) for row, o in enumerate(bent)}
     return [found[o] for o in range(len(method.outputs))]
 
 
@@ -140,14 +140,14 @@ class _Mapped:
             z[variable, :INSIDE] = _quantiles(law, (1 - self.level) / 2, (1 + self.level) / 2, INSIDE)
             z[variable, INSIDE:] = _quantiles(law, 0.0005, 0.9995, SPREAD)
             self.through[variable] = evaluate_at(self.model, self.space, z)[0]
-        values, spread = np.split(self.through[variable][output], [INSIDE])
-        step = np.diff(values)
+        values, spread = self.through[variable][output, :INSIDE], self.through[variable][output, INSIDE:]
+        step = values[1:] - values[:-1]
         if not np.isfinite(values).all() or not ((step > 0).all() or (step < 0).all()):
             return None
         low, high = sorted((float(values[0]), float(values[-1])))
         how = "mapped through the one uncertain input"
         if np.isfinite(spread).all():
-            return _Answer(float(np.std(spread)), low, high, how)
+            return _Answer(float(spread.std()), low, high, how)
         return _Answer(None, low, high, how, (_HEAVY_TAIL,))
 
 
@@ -222,7 +222,7 @@ def _budgets(
     """
     assert nominal.curvature is not None
     bent = np.array([answer.evaluation != "first order" for answer in answers])
-    squared = np.nan_to_num(nominal.contributions**2 + nominal.curvature * bent)
+    squared = np.nan_to_num(nominal.contributions**2 + np.where(bent, nominal.curvature, 0.0))
     for answer, signed, own in zip(answers, nominal.contributions.T.tolist(), squared.T.tolist(), strict=True):
         yield _budget(lines, signed, own, answer.u)
 

@@ -13,7 +13,7 @@ from ..document import Document
 from ..errors import GeometryError, InputError
 from ..method import Method
 from ..methods import calculator
-from ..noun import fields_of
+from ..noun import fields_of, unchecked
 from ..quantity import Quantity
 from .given import given
 from .improve import improved
@@ -51,7 +51,7 @@ def calculate(
     camera = {"f_px": f.value, "u_f_px": f.u, "width_px": round(values["image_width"]), "height_px": None,
               "source": "the relation between focal length, sensor and picture"}  # fmt: skip
     # the notes stand with the headline only: they are the same for all
-    return Document(improved((found[0], *(dataclasses.replace(m, notes=()) for m in found[1:]))), camera)
+    return Document(improved((found[0], *(unchecked(m, notes=()) for m in found[1:]))), camera)
 
 
 def _answering(unknown: str) -> Method:
@@ -80,7 +80,7 @@ def _check_answer(values: dict[str, float], inputs: calculator.Inputs, image_hei
 def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
     for name in (*calculator.UNKNOWNS, "aspect"):
         quantity = getattr(inputs, name)
-        if quantity is not None and not np.all(np.asarray(quantity.value) > 0):
+        if quantity is not None and not np.greater(quantity.value, 0).all():
             raise InputError(
                 name.replace("_", " "), f"{float(quantity.value):g} {quantity.unit}", "give a number above 0"
             )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
+from ..noun import unchecked
 from ..quantity import Measurement
 from ..reports.rounding import digits_for, fitting_unit, grouped
 
@@ -42,4 +42,4 @@ def improve(m: Measurement) -> str:
 
 def improved(measurements: tuple[Measurement, ...]) -> tuple[Measurement, ...]:
     """The measurements with `improve` filled in."""
-    return tuple(dataclasses.replace(m, improve=improve(m)) for m in measurements)
+    return tuple(unchecked(m, improve=improve(m)) for m in measurements)
