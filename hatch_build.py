@@ -48,7 +48,7 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
         """Node, only where it is wanted."""
         return [NODE] if self.needed() else []
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
         """Install what the page is built with, where that changed, and build it."""
         if not self.needed():
             return
@@ -58,7 +58,9 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
         if not installed.is_file() or installed.read_text() != lock:
             self.run("npm", "ci", *QUIET, cure="npm can't get what the page is built with")
             installed.write_text(lock)
-        self.run("node", "node_modules/vite/bin/vite.js", "build", "--logLevel", "error", cure="the page can't be built")
+        self.run(
+            "node", "node_modules/vite/bin/vite.js", "build", "--logLevel", "error", cure="the page can't be built"
+        )
         (self.static / ".built-from").write_text(digest)
 
     def run(self, program: str, *words: str, cure: str) -> None:
@@ -74,4 +76,6 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg]
         done = subprocess.run(command, cwd=self.page, env=environment, capture_output=True, text=True, check=False)
         if done.returncode:
             said = " ".join((done.stderr or done.stdout).split())[-600:]
-            raise SystemExit(f"subtense: {cure}: {said}\nTo install without the page (everything else works), set {WITHOUT}=1.")
+            raise SystemExit(
+                f"subtense: {cure}: {said}\nTo install without the page (everything else works), set {WITHOUT}=1."
+            )

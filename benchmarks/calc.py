@@ -96,5 +96,7 @@ def times_ms(texts: list[dict[str, str | None]]) -> list[float]:
 if __name__ == "__main__":
     several = without_draws()
     ms = np.array(times_ms(several))
-    print(f"{len(several)} calculations: median {np.median(ms):.3f} ms, 90 % below {np.quantile(ms, 0.9):.3f} ms, mean {ms.mean():.3f} ms")
+    print(
+        f"{len(several)} calculations: median {np.median(ms):.3f} ms, 90 % below {np.quantile(ms, 0.9):.3f} ms, mean {ms.mean():.3f} ms"
+    )
     print(table(comparisons()))

@@ -27,7 +27,13 @@ import numpy as np
 HERE = Path(__file__).parent
 DOCUMENT = HERE.parent / "docs" / "benchmarks.md"
 BEGIN, END = "<!-- page: begin -->", "<!-- page: end -->"
-BROWSER = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
+BROWSER = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 EMPTY = """
 from fastapi import FastAPI
 app = FastAPI()
@@ -66,7 +72,9 @@ def free_port() -> int:
 @contextlib.contextmanager
 def running(command: list[str], port: int, **environment: str) -> Iterator[None]:
     """A server in a process of its own, once it listens."""
-    process = subprocess.Popen(command, env={**os.environ, **environment}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        command, env={**os.environ, **environment}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     try:
         for _ in range(400):
             with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), 0.2):
@@ -120,7 +128,12 @@ def per_second(port: int, requests: list[bytes], connections: int = 8, seconds: 
 def posted(path: str, port: int, body: dict[str, Any], token: str = "") -> bytes:
     """A request as bytes."""
     content = json.dumps(body).encode()
-    lines = [f"POST {path} HTTP/1.1", f"Host: 127.0.0.1:{port}", "Content-Type: application/json", f"Content-Length: {len(content)}"]
+    lines = [
+        f"POST {path} HTTP/1.1",
+        f"Host: 127.0.0.1:{port}",
+        "Content-Type: application/json",
+        f"Content-Length: {len(content)}",
+    ]
     return "\r\n".join([*lines, *([f"Authorization: Bearer {token}"] if token else []), "", ""]).encode() + content
 
 
@@ -131,7 +144,18 @@ def throughput(address: str, token: str, folder: str) -> list[Figure]:
     bodies = [{"focal": "35", "sensor_width": "14.1", "image_width": "4096", "size": f"{200 + i * 0.01:.2f}", "extent": f"{150 + i % 997}"}
               for i in range(20_000)]  # fmt: skip
     requests = [posted("/api/calc", port, body, token) for body in bodies]
-    command = [sys.executable, "-m", "uvicorn", "empty:app", "--app-dir", folder, "--port", str(other), "--log-level", "error"]
+    command = [
+        sys.executable,
+        "-m",
+        "uvicorn",
+        "empty:app",
+        "--app-dir",
+        folder,
+        "--port",
+        str(other),
+        "--log-level",
+        "error",
+    ]
     with running(command, other):
         ratios, rates = [], []
         for turn in range(5):
@@ -154,9 +178,16 @@ USABLE = """(function look() {
 KEY_TO_PAINT = """() => new Promise(resolve => {
   const field = document.querySelector('#extent'), shown = document.querySelector('[data-testid=nominal]'), before = shown.textContent
   const start = performance.now()
-  new MutationObserver((_, observer) => { if (shown.textContent !== before) { observer.disconnect(); requestAnimationFrame(() => {
-    const channel = new MessageChannel(); channel.port1.onmessage = () => resolve(performance.now() - start); channel.port2.postMessage(0) }) } })
-    .observe(shown, {characterData: true, childList: true, subtree: true})
+  const painted = () => {  // a message that is sent in a frame arrives when that is painted
+    const channel = new MessageChannel()
+    channel.port1.onmessage = () => resolve(performance.now() - start)
+    channel.port2.postMessage(0)
+  }
+  new MutationObserver((_, observer) => {
+    if (shown.textContent === before) return
+    observer.disconnect()
+    requestAnimationFrame(painted)
+  }).observe(shown, {characterData: true, childList: true, subtree: true})
   field.value = String(100 + Math.floor(Math.random() * 3000)); field.dispatchEvent(new InputEvent('input', {bubbles: true}))
 })"""
 
@@ -171,7 +202,9 @@ def calculator(browser: Any, address: str, token: str) -> list[Figure]:
         session = context.new_cdp_session(page)
         session.send("Network.enable")
         received: list[int] = []
-        session.on("Network.loadingFinished", lambda event, received=received: received.append(event["encodedDataLength"]))
+        session.on(
+            "Network.loadingFinished", lambda event, received=received: received.append(event["encodedDataLength"])
+        )
         page.add_init_script(USABLE)
         page.goto(address + "/")
         page.wait_for_timeout(1200)
@@ -180,8 +213,11 @@ def calculator(browser: Any, address: str, token: str) -> list[Figure]:
         sizes.append(sum(received))  # with what loads behind it
         keys += [page.evaluate(KEY_TO_PAINT) for _ in range(9)]
         context.close()
-    return [Figure("calculator: usable after", median(waits), "s", 0.6), Figure("calculator: transferred, chart and explanation included", max(sizes) / 1000, "kB", 150),
-            Figure("key to paint, median", median(keys), "ms", 30)]  # fmt: skip
+    return [
+        Figure("calculator: usable after", median(waits), "s", 0.6),
+        Figure("calculator: transferred, chart and explanation included", max(sizes) / 1000, "kB", 150),
+        Figure("key to paint, median", median(keys), "ms", 30),
+    ]
 
 
 def photo_of_24_mp(path: Path) -> None:
@@ -190,7 +226,9 @@ def photo_of_24_mp(path: Path) -> None:
     from PIL.TiffImagePlugin import IFDRational
 
     rng = np.random.default_rng(1)
-    coarse = Image.fromarray(rng.integers(0, 256, (500, 750, 3), np.uint8)).resize((6000, 4000), Image.Resampling.BICUBIC)
+    coarse = Image.fromarray(rng.integers(0, 256, (500, 750, 3), np.uint8)).resize(
+        (6000, 4000), Image.Resampling.BICUBIC
+    )
     exif = Image.Exif()
     exif.get_ifd(0x8769).update({0x920A: IFDRational(24, 1), 0xA405: 24})
     coarse.save(path, quality=90, exif=exif)
@@ -216,7 +254,10 @@ def stage(browser: Any, address: str, token: str, photo: Path) -> list[Figure]:
     page.wait_for_timeout(800)
     page.evaluate(FRAMES)
     session = page.context.new_cdp_session(page)
-    figures = [Figure("first view after decoding", first, "s", 0.6), Figure("handle behind the pointer", _lag(page, box), "px", 0.5)]
+    figures = [
+        Figure("first view after decoding", first, "s", 0.6),
+        Figure("handle behind the pointer", _lag(page, box), "px", 0.5),
+    ]
     for name, work in (("dragging a handle", _drag), ("zooming", _zoom), ("moving the picture", _pan)):
         page.wait_for_timeout(500)
         page.evaluate("window.frames.length = 0")
@@ -237,7 +278,9 @@ def _lag(page: Any, box: dict[str, float]) -> float:
     for x, y in ((520, 340), (610, 420), (333, 222), (700, 500), (500, 300)):
         page.mouse.move(box["x"] + x, box["y"] + y)
         spot = handle.bounding_box()
-        worst = max(worst, abs(spot["x"] + spot["width"] / 2 - box["x"] - x), abs(spot["y"] + spot["height"] / 2 - box["y"] - y))
+        worst = max(
+            worst, abs(spot["x"] + spot["width"] / 2 - box["x"] - x), abs(spot["y"] + spot["height"] / 2 - box["y"] - y)
+        )
     page.mouse.up()
     return worst
 
@@ -264,7 +307,10 @@ def _drag(page: Any, session: Any, box: dict[str, float]) -> None:
 def _zoom(page: Any, session: Any, box: dict[str, float]) -> None:
     for step in range(60):
         delta = -60 if step % 30 < 15 else 60
-        session.send("Input.dispatchMouseEvent", {"type": "mouseWheel", "x": box["x"] + 600, "y": box["y"] + 400, "deltaX": 0, "deltaY": delta})
+        session.send(
+            "Input.dispatchMouseEvent",
+            {"type": "mouseWheel", "x": box["x"] + 600, "y": box["y"] + 400, "deltaX": 0, "deltaY": delta},
+        )
         page.wait_for_timeout(30)
 
 
@@ -282,7 +328,9 @@ def table(figures: list[Figure]) -> str:
     lines = ["| what | measured | goal | |", "|---|---|---|---|"]
     for f in figures:
         sign = "≤" if f.most else "≥"
-        lines.append(f"| {f.what} | {f.value:.3g} {f.unit} | {sign} {f.goal:g} {f.unit} | {'met' if f.met else 'MISSED'} |")
+        lines.append(
+            f"| {f.what} | {f.value:.3g} {f.unit} | {sign} {f.goal:g} {f.unit} | {'met' if f.met else 'MISSED'} |"
+        )
     return "\n".join(lines).replace("  |", " |")
 
 
@@ -300,9 +348,14 @@ def main() -> None:
             figures += stage(browser, address, token, photo)
             browser.close()
     print(table(figures))
-    (HERE / "page.json").write_text(json.dumps([{**asdict(f), "met": f.met} for f in figures], indent=1) + "\n", encoding="utf-8")
+    (HERE / "page.json").write_text(
+        json.dumps([{**asdict(f), "met": f.met} for f in figures], indent=1) + "\n", encoding="utf-8"
+    )
     text = DOCUMENT.read_text(encoding="utf-8")
-    DOCUMENT.write_text(re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n{table(figures)}\n{END}", text, flags=re.DOTALL), encoding="utf-8")
+    DOCUMENT.write_text(
+        re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n{table(figures)}\n{END}", text, flags=re.DOTALL),
+        encoding="utf-8",
+    )
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-
 from hatch_build import NODE, PageHook
 
 ROOT = Path(__file__).parent.parent

@@ -23,7 +23,10 @@ def main() -> int:
         print(f"give one of {', '.join(COMMANDS)}", file=sys.stderr)
         return 2
     if not (PAGE / "node_modules").is_dir():
-        print("the page's packages are not installed: pip install --editable . installs them and builds it", file=sys.stderr)
+        print(
+            "the page's packages are not installed: pip install --editable . installs them and builds it",
+            file=sys.stderr,
+        )
         return 2
     return subprocess.run([NODE, *COMMANDS[sys.argv[1]]], cwd=PAGE, check=False).returncode
 

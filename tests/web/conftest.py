@@ -19,7 +19,7 @@ def browser_type_launch_args() -> dict:
     return {"executable_path": CHROMIUM, "args": ARGUMENTS}
 
 
-@pytest.fixture()
+@pytest.fixture
 def visit(browser, server) -> Iterator[Visit]:
     """A desktop visit in the light theme."""
     found = visiting(browser, server)

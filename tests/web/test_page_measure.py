@@ -101,7 +101,9 @@ def test_a_rectangle_names_its_sides(visit, examples):
     before = page.locator("[data-shape=A] .side").all_text_contents()
     page.get_by_role("button", name="Swap sides").click()
     page.wait_for_timeout(200)
-    assert page.locator("[data-shape=A] .side").all_text_contents() == before  # the texts stay, the edges they stand at change
+    assert (
+        page.locator("[data-shape=A] .side").all_text_contents() == before
+    )  # the texts stay, the edges they stand at change
     assert {text.split()[0] for text in before if text} == {"297", "210"}
 
 
@@ -263,7 +265,11 @@ def test_a_broken_picture_is_explained(visit, tmp_path):
 def test_a_picture_of_fifty_million_pixels(visit, tmp_path):
     """A flat PNG of 8660 x 5773, written without holding it."""
     wide, high = 8660, 5773
-    row = b"\0" + bytes(np.tile(np.arange(0, 256, 2, dtype=np.uint8), 203)[: 3 * wide // 3 * 3].tobytes().ljust(3 * wide, b"\x80")[: 3 * wide])
+    row = b"\0" + bytes(
+        np.tile(np.arange(0, 256, 2, dtype=np.uint8), 203)[: 3 * wide // 3 * 3]
+        .tobytes()
+        .ljust(3 * wide, b"\x80")[: 3 * wide]
+    )
     data = zlib.compress(row * high, 1)
 
     def chunk(kind: bytes, body: bytes) -> bytes:
@@ -341,7 +347,13 @@ def test_reports_can_be_saved(visit, examples):
     draw(page, "Known size", (300, 300), (500, 340))
     page.keyboard.type("200 mm")
     expect(page.get_by_test_id("answer")).to_have_text(re.compile("mm"))
-    begins = {"text": b"desk.jpg", "JSON": b"{", "CSV table": b"photo,", "PDF report": b"%PDF", "annotated picture": b"\x89PNG"}
+    begins = {
+        "text": b"desk.jpg",
+        "JSON": b"{",
+        "CSV table": b"photo,",
+        "PDF report": b"%PDF",
+        "annotated picture": b"\x89PNG",
+    }
     for name, start in begins.items():
         page.locator("summary").filter(has_text="Save").click()
         with page.expect_download() as saved:
@@ -406,7 +418,11 @@ def test_two_fingers_zoom(browser, server, examples):
     session = visit.context.new_cdp_session(page)
 
     def touch(kind: str, apart: float) -> None:
-        points = [] if kind == "touchEnd" else [{"x": 190 - apart, "y": box["y"] + 90, "id": 0}, {"x": 190 + apart, "y": box["y"] + 90, "id": 1}]
+        points = (
+            []
+            if kind == "touchEnd"
+            else [{"x": 190 - apart, "y": box["y"] + 90, "id": 0}, {"x": 190 + apart, "y": box["y"] + 90, "id": 1}]
+        )
         session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
     touch("touchStart", 30)

@@ -66,7 +66,7 @@ def create_app(settings: Settings, photos: tuple[Path, ...] = ()) -> FastAPI:
     openapi.install(app)
     _handle_errors(app)
     _add_login(app, settings)
-    _add_page(app)
+    app.add_middleware(static.Page)
     app.add_middleware(Bodies, limits=settings.limits)
     app.add_middleware(Guard, settings=settings)
     return app
@@ -122,14 +122,3 @@ def _add_login(app: FastAPI, settings: Settings) -> None:
             await asyncio.sleep(0.3)
             return login.page(password=asks, message="That is not it.")
         return welcomed(RedirectResponse("/", 303), settings)
-
-
-def _add_page(app: FastAPI) -> None:
-    @app.get("/{path:path}", include_in_schema=False)
-    async def page(request: Request, path: str) -> Response:
-        found = static.assets().get(f"/{path}")
-        if found is not None:
-            return found.answer(request)
-        if f"/{path}" in static.PAGES:
-            return Response(static.HOW_TO_BUILD, 503, media_type="text/plain")
-        return problem(404, "path", "no such page", "Absent")

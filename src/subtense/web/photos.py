@@ -128,7 +128,11 @@ class Photos:
         old = self.held.get(held.id)
         if old is not None:
             shutil.rmtree(held.folder, ignore_errors=True)
-            old.kept, old.asked_s, old.photo = old.kept or kept, time.monotonic(), replace(old.photo, name=held.photo.name)
+            old.kept, old.asked_s, old.photo = (
+                old.kept or kept,
+                time.monotonic(),
+                replace(old.photo, name=held.photo.name),
+            )
             return old
         self.held[held.id] = held
         self.sweep()

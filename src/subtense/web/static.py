@@ -10,10 +10,11 @@ from pathlib import Path
 
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 FOLDER = Path(__file__).parent / "static"
-PAGES = {"/": "index.html", "/measure": "measure.html", "/api": "api.html", "/licences": "licences.html"}
-PACKED = (".html", ".js", ".css", ".svg", ".json", ".txt")
+PAGES = {"/": "index.html", "/measure": "measure.html", "/api": "api.html", "/licences": "licences.md"}
+PACKED = (".html", ".js", ".css", ".svg", ".json", ".txt", ".md")
 HOW_TO_BUILD = (
     "the page is not in this installation (it was built with SUBTENSE_WITHOUT_PAGE=1, or npm could not be reached); the API under "
     "/api works; to have the page, install again with npm in reach"
@@ -22,6 +23,7 @@ _TYPES = {
     ".js": "text/javascript; charset=utf-8",
     ".css": "text/css; charset=utf-8",
     ".html": "text/html; charset=utf-8",
+    ".md": "text/plain; charset=utf-8",  # so that a browser shows it
 }
 
 
@@ -63,3 +65,20 @@ def _asset(file: Path) -> Asset:
     packed = gzip.compress(plain, 9, mtime=0) if file.suffix in PACKED and len(plain) > 1000 else None
     kind = _TYPES.get(file.suffix) or mimetypes.guess_type(file.name)[0] or "application/octet-stream"
     return Asset(plain, packed, kind, file.parent.name == "assets")
+
+
+class Page:
+    """ASGI middleware: the page's files; every other path is for the routes, and absent where they have none."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        answer: ASGIApp = self.app
+        if scope["type"] == "http" and scope["method"] in ("GET", "HEAD"):
+            found = assets().get(scope["path"])
+            if found is not None:
+                answer = found.answer(Request(scope))
+            elif scope["path"] in PAGES:
+                answer = Response(HOW_TO_BUILD, 503, media_type="text/plain")
+        await answer(scope, receive, send)

@@ -62,7 +62,8 @@ def methods() -> list[dict[str, Any]]:
 def describe(method: Method) -> dict[str, Any]:
     """One method: what it needs, assumes and gives."""
     return {
-        "name": method.name, "title": method.title, "button": method.button or method.name, "needs": method.needs, "assumes": list(method.assumes),
+        "name": method.name, "title": method.title, "button": method.button or method.name, "needs": method.needs,
+        "assumes": list(method.assumes),
         "source": method.source, "typical": method.typical,
         "outputs": [{"what": o.what, "unit": o.unit, "title": o.title} for o in method.outputs],
         "inputs": schema(method), "example": given(method.example()),
