@@ -10,6 +10,7 @@ import re
 from importlib.metadata import version
 from pathlib import Path
 
+import calc
 import monte_carlo
 import pictures
 import rows
@@ -19,7 +20,7 @@ from comparison import Comparison, table
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "docs" / "benchmarks.md"
 BEGIN, END = "<!-- benchmarks: begin -->", "<!-- benchmarks: end -->"
-ALL = {"startup": startup, "monte_carlo": monte_carlo, "rows": rows, "pictures": pictures}
+ALL = {"startup": startup, "calc": calc, "monte_carlo": monte_carlo, "rows": rows, "pictures": pictures}
 
 
 def main() -> None:

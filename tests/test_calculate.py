@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from subtense.errors import InputError
 from subtense.quantity import Quantity
 from subtense.workflow.calculate import calculate, curve
 from subtense.workflow.calculator_input import calculator_input
@@ -105,3 +106,9 @@ def test_exact_inputs_have_no_band():
     )
     found = curve(inputs)
     assert found["low"] == found["value"] == found["high"]
+
+
+def test_several_scenes_at_once_are_refused():
+    inputs = dataclasses.replace(inputs_of("distance"), size=Quantity.exact(np.array([0.1, 0.2]), "m"))
+    with pytest.raises(InputError, match="one scene at a time"):
+        calculate(inputs)

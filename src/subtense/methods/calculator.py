@@ -19,7 +19,6 @@ from ..errors import InputError
 from ..focus import classical, close_focus
 from ..geometry import segment_depth
 from ..method import Method, Output, Reason, reasons
-from ..noun import unchecked
 from ..quantity import Note, Quantity
 
 UNKNOWNS = ("distance", "size", "extent", "focal_length", "sensor_width", "image_width")
@@ -102,9 +101,9 @@ class Result:
     reason: Codes
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Scene:
-    """The inputs as arrays; the unknown is None. Lengths in m, pixels as pixels of the width's pitch."""
+    """The inputs as arrays; the unknown is None until it is solved. Lengths in m, pixels as pixels of the width's pitch."""
 
     focal: Array | None
     size: Array | None
@@ -210,10 +209,10 @@ def calculator(inputs: Inputs) -> Result:
 
     Source: similar triangles; see the module.
     """
-    given, unknown = _scene(inputs), inputs.unknown
+    s, unknown = _scene(inputs), inputs.unknown
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        solved = _SOLVERS[unknown](given)
-        s = unchecked(given, **{_FIELDS[unknown]: solved})
+        solved = _SOLVERS[unknown](s)
+        setattr(s, _FIELDS[unknown], solved)
         focal, size, extent, distance, sensor = s.focal, s.size, s.extent, s.distance, s.sensor
         assert focal is not None and size is not None and extent is not None and distance is not None
         assert sensor is not None and s.image is not None
@@ -221,9 +220,11 @@ def calculator(inputs: Inputs) -> Result:
         f = focal / pitch
         bx, by, ax, ay = s.ox / f, s.oy / f, s.ex * extent / f, s.ey * extent / f
         step = size * s.sine / 4 / distance  # the middle of the 3-D segment: Z b + (half step) a / 2
-        range_m = distance * np.sqrt(1 + (bx + step * ax) ** 2 + (by + step * ay) ** 2)
+        mx, my = bx + step * ax, by + step * ay
+        range_m = distance * np.sqrt(1 + mx * mx + my * my)
         view = 2 * np.arctan2(sensor, 2 * focal)
-        angle = _angle(bx - ax / 2, by - ay / 2, bx + ax / 2, by + ay / 2)
+        hx, hy = ax / 2, ay / 2
+        angle = _angle(bx - hx, by - hy, bx + hx, by + hy)
         per_px = size / extent
     code = reasons(
         np.broadcast_shapes(range_m.shape, angle.shape), (~((focal > 0) & (size > 0) & (pitch > 0)), Reason.OUT_OF_RANGE),

@@ -103,10 +103,11 @@ def scene(model: Model, space: Space, level: float) -> Propagated:
     u = np.sqrt((s * s).sum(axis=1))
     u2 = np.sqrt(u * u + (hessian * hessian).sum(axis=(1, 2)) / 2)
     dof = effective_dof(u, contributions, np.array([line.dof for line in space.lines]))
-    quadratic = _quadratic(u, s, hessian, space.lines, level)
+    means, kurtosis = _moments(space.lines)
+    quadratic = _quadratic(u, s, hessian, means, kurtosis, level)
     return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, _coverage_factors(level, dof), dof,
                       contributions, s @ s.T, u2, quadratic.bend, np.asarray(reason[0]), quadratic,
-                      _own_curvature(space.lines, hessian))  # fmt: skip
+                      _own_curvature(space.lines, hessian, kurtosis))  # fmt: skip
 
 
 @lru_cache(maxsize=64)
@@ -146,12 +147,11 @@ def _by_line(lines: Sequence[Line], s: Array) -> Array:
     return np.array(rows).reshape(len(lines), len(s))
 
 
-def _own_curvature(lines: Sequence[Line], hessian: Array) -> Array:
+def _own_curvature(lines: Sequence[Line], hessian: Array, kurtosis: Array) -> Array:
     """(l, o) variance that the second differences within each line add to the first-order one.
 
     A variable z of kurtosis 3 + e has Var(h z^2 / 2) = h^2 (2 + e) / 4.
     """
-    _, kurtosis = _moments(lines)
     own = np.einsum("oii->io", hessian) ** 2 * ((2 + kurtosis) / 4)[:, None]
     rows, first = [], 0
     for line in lines:
@@ -216,14 +216,13 @@ class Quadratic:
     active: Bools
 
 
-def _quadratic(u: Array, s: Array, hessian: Array, lines: Sequence[Line], level: float) -> Quadratic:
+def _quadratic(u: Array, s: Array, hessian: Array, means: Array, kurtosis: Array, level: float) -> Quadratic:
     """Moments of the quadratic response, and its interval by Cornish and Fisher's expansion.
 
     Source: P. Hall, The Bootstrap and Edgeworth Expansion, 2.5.
     """
     bent = hessian.any(axis=1)
     active = (abs(s) > 1e-6 * u[:, None]) | bent
-    means, kurtosis = _moments(lines)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         centred = s * s * (1 - means**2)
         squared = hessian @ hessian

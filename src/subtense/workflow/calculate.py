@@ -37,9 +37,11 @@ def calculate(
         seed: of the draws, where they are needed.
 
     Raises:
-        InputError: a value of 0 or below, an extent wider than the picture.
+        InputError: a value of 0 or below, an extent wider than the picture, several scenes at once.
         GeometryError: no finite answer.
     """
+    if any(isinstance(value, Quantity) and value.leading for value in vars(inputs).values()):
+        raise InputError("inputs", "with leading axes", "one scene at a time; use propagate.rows for many")
     _check(inputs, image_height)
     unknown = inputs.unknown
     method = _ANSWERING[unknown]
@@ -80,7 +82,7 @@ def _check_answer(values: dict[str, float], inputs: calculator.Inputs, image_hei
 def _check(inputs: calculator.Inputs, image_height: Quantity | None) -> None:
     for name in (*calculator.UNKNOWNS, "aspect"):
         quantity = getattr(inputs, name)
-        if quantity is not None and not np.greater(quantity.value, 0).all():
+        if quantity is not None and not (float(quantity.value) > 0):
             raise InputError(
                 name.replace("_", " "), f"{float(quantity.value):g} {quantity.unit}", "give a number above 0"
             )
