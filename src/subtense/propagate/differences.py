@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, Bools, Codes, Indices
-from ..distribution import normal_quantile, t_quantile
+from ..distribution import Distribution, normal_quantile, t_quantile
 from ..method import Method
 from ..space import Correlations, Line, Moved, Space
 from .model import Function, Model, evaluate_at, model_of
@@ -103,11 +103,11 @@ def scene(model: Model, space: Space, level: float) -> Propagated:
     u = np.sqrt((s * s).sum(axis=1))
     u2 = np.sqrt(u * u + (hessian * hessian).sum(axis=(1, 2)) / 2)
     dof = effective_dof(u, contributions, np.array([line.dof for line in space.lines]))
-    means, kurtosis = _moments(space.lines)
-    quadratic = _quadratic(u, s, hessian, means, kurtosis, level)
+    laws = tuple(law for line in space.lines for law in line.laws)
+    quadratic = _quadratic(u, s, hessian, laws, level)
     return Propagated(model.names, tuple(line.name for line in space.lines), y0, u, _coverage_factors(level, dof), dof,
                       contributions, s @ s.T, u2, quadratic.bend, np.asarray(reason[0]), quadratic,
-                      _own_curvature(space.lines, hessian, kurtosis))  # fmt: skip
+                      _own_curvature(space.lines, hessian, _moments(laws)[1]))  # fmt: skip
 
 
 @lru_cache(maxsize=64)
@@ -165,11 +165,18 @@ def _own_curvature(lines: Sequence[Line], hessian: Array, kurtosis: Array) -> Ar
     return np.array(rows).reshape(len(lines), len(hessian))
 
 
-def _moments(lines: Sequence[Line]) -> tuple[Array, Array]:
-    """(m,) mean and excess kurtosis of each variable; that of t, which may not exist, is left out."""
-    laws = [law for line in lines for law in line.laws]
+@lru_cache(maxsize=64)
+def _moments(laws: tuple[Distribution, ...]) -> tuple[Array, Array, Array]:
+    """(m,) mean and excess kurtosis of each variable, and whether its law is not symmetric about the mean.
+
+    The kurtosis of t, which may not exist, is left out.
+    """
     kurtosis = [0.0 if law.name == "t" else law.excess_kurtosis for law in laws]
-    return np.array([law.mean for law in laws]), np.array(kurtosis)
+    lopsided = [law.name == "either" for law in laws]
+    found = np.array([law.mean for law in laws]), np.array(kurtosis), np.array(lopsided)
+    for array in found:
+        array.flags.writeable = False
+    return found
 
 
 def effective_dof(u: Array, contributions: Array, dof: Array) -> Array:
@@ -204,6 +211,10 @@ class Quadratic:
         low: (o,) lower interval limit, as offset from the nominal value.
         high: (o,) upper interval limit, likewise.
         bend: (o,) the largest distance of these limits from the first-order ones, in first-order u.
+        curved: (o,) the same from those of a straight response of the same laws: what the second differences alone do.
+        shift: (2, o) that they move the lower and the upper limit by.
+        slopes: (o, m) of the standardised variables, at their means.
+        offset: (o,) of the straight response with these slopes where all variables are 0.
         excess: (o,) kurtosis less 3, from the laws of the inputs.
         active: (o, m) whether a variable moves the output at all.
     """
@@ -212,38 +223,53 @@ class Quadratic:
     low: Array
     high: Array
     bend: Array
+    curved: Array
+    shift: Array
+    slopes: Array
+    offset: Array
     excess: Array
     active: Bools
 
 
-def _quadratic(u: Array, s: Array, hessian: Array, means: Array, kurtosis: Array, level: float) -> Quadratic:
+def _quadratic(u: Array, s: Array, hessian: Array, laws: tuple[Distribution, ...], level: float) -> Quadratic:
     """Moments of the quadratic response, and its interval by Cornish and Fisher's expansion.
+
+    A one-sided law has its mean beside the stated value: the response is expanded about the means, where laws are symmetric.
 
     Source: P. Hall, The Bootstrap and Edgeworth Expansion, 2.5.
     """
+    means, kurtosis, lopsided = _moments(laws)
     bent = hessian.any(axis=1)
     active = (abs(s) > 1e-6 * u[:, None]) | bent
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        centred = s * s * (1 - means**2)
-        squared = hessian @ hessian
-        variance = centred.sum(axis=1) + squared.trace(0, 1, 2) / 2
-        mean = hessian.trace(0, 1, 2) / 2 + s @ means
-        third = 3 * np.einsum("oi,oij,oj->o", s, hessian, s) + (squared * hessian).sum(axis=(1, 2))
-        spread, excess = np.sqrt(variance), centred**2 @ kurtosis / variance**2
+        turned = hessian @ means
+        slopes, offset = s + turned, -(turned @ means) / 2
+        width = np.sqrt(1 - means**2)
+        inner, curvature = slopes * width, hessian * np.outer(width, width)
+        squared = curvature @ curvature
+        straight, centre = (inner * inner).sum(axis=1), offset + slopes @ means
+        variance = straight + squared.trace(0, 1, 2) / 2
+        mean = centre + curvature.trace(0, 1, 2) / 2
+        third = 3 * np.einsum("oi,oij,oj->o", inner, curvature, inner) + (squared * curvature).sum(axis=(1, 2))
+        fourth = inner**4 @ kurtosis
+        spread, excess = np.sqrt(variance), fourth / variance**2
         skew = third / (variance * spread)
         z = normal_quantile(0.5 + level / 2)
         low, high = (mean + spread * _cornish_fisher(x, skew, excess) for x in (-z, z))
         bend = np.maximum(abs(low + z * u), abs(high - z * u)) / u
+        flat = np.sqrt(straight) * _cornish_fisher(z, 0.0, fourth / straight**2)
+        shift = np.array([low - centre + flat, high - centre - flat])
+        curved = np.where((abs(s) * lopsided > 0).any(axis=1), bend, abs(shift).max(axis=0) / u)
     known = np.isfinite(s).all(axis=1) & np.isfinite(bend) & (u > 0)
     if not known.all():
         still = (u == 0) & ~np.any(bent, axis=1)
         open_ = np.where(still, 0.0, np.inf)
         spread, low, high = (np.where(known, a, b) for a, b in ((spread, u), (low, -open_), (high, open_)))
-        bend, excess = np.where(known, bend, open_), np.where(known, excess, 0.0)
-    return Quadratic(spread, low, high, bend, excess, active)
+        bend, curved, excess = (np.where(known, a, b) for a, b in ((bend, open_), (curved, open_), (excess, 0.0)))
+    return Quadratic(spread, low, high, bend, curved, shift, slopes, offset, excess, active)
 
 
-def _cornish_fisher(z: float, skew: Array, excess: Array) -> Array:
+def _cornish_fisher(z: float, skew: Array | float, excess: Array) -> Array:
     """(o,) quantiles of standardised laws near the normal one."""
     return z + (z * z - 1) * skew / 6 + (z**3 - 3 * z) * excess / 24 - (2 * z**3 - 5 * z) * skew**2 / 36
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 HIGHEST_LEVEL = 0.999
 """Beyond it the tails of no law are known well enough, and draws don't reach them."""
-NEARLY_NORMAL = 0.4
-"""Excess kurtosis up to which Cornish and Fisher's expansion is trusted: a uniform input may make half the variance."""
+NEARLY_NORMAL = 0.1
+"""Excess kurtosis up to which Cornish and Fisher's expansion is trusted; beyond it the laws are convolved."""
 
 
 def measure(
@@ -113,11 +113,21 @@ def _without_draws(nominal: Propagated, o: int, digits: int, mapped: _Mapped) ->
         found = mapped.answer(o, int(active[0]))
         if found:
             return found
-    # what the quadratic response leaves out is of the next order, and the expansion is for nearly normal sums
-    if bend**2 <= allowed and abs(quadratic.excess[o]) < NEARLY_NORMAL and math.isinf(nominal.dof[o]):
+    curved = float(quadratic.curved[o])
+    # what the quadratic response leaves out is of the next order
+    if curved**2 > allowed or not math.isinf(nominal.dof[o]):
+        return None
+    if abs(quadratic.excess[o]) < NEARLY_NORMAL:  # which the expansion is for
         low, high = value + float(quadratic.low[o]), value + float(quadratic.high[o])
         return _Answer(float(quadratic.u[o]), low, high, "second order")
-    return None
+    if curved > allowed:
+        return None
+    from .convolved import interval  # few measurements need it
+
+    ends = interval(quadratic.slopes[o], mapped.laws, mapped.level)
+    start = value + float(quadratic.offset[o])
+    low, high = (start + end + float(shift) for end, shift in zip(ends, quadratic.shift[:, o], strict=True))
+    return _Answer(float(quadratic.u[o]), low, high, "second order, laws convolved")
 
 
 INSIDE, SPREAD = 33, 1000
