@@ -44,7 +44,7 @@ _HOME = {
     "InputError": "errors", "METHODS": "workflow.tables", "Measurement": "quantity", "Method": "method",
     "MissingExtraError": "errors", "NothingFoundError": "errors", "Observation": "observation", "Photo": "photo",
     "Quantity": "quantity", "SubtenseError": "errors", "Target": "target", "UnknownCameraError": "errors",
-    "calculate": "workflow.calculate", "calculator_input": "workflow.calculator_input", 
+    "calculate": "workflow.calculate", "calculator_input": "workflow.calculator_input",
     "measure_lines": "workflow.measure", "measure_markers": "workflow.measure",
     "propagate": "propagate", "resolve_camera": "workflow.resolve_camera",
 }  # fmt: skip

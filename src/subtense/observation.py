@@ -50,7 +50,9 @@ class Observation(Noun):
         if not np.all(np.isfinite(sigma)) or np.any(sigma < 0):
             raise InputError("sigma_px", self.sigma_px, "give a standard deviation in pixels of 0 or above")
         if sigma.ndim and sigma.shape[-1] != points.shape[-2]:
-            raise InputError("sigma_px", f"of shape {sigma.shape}", f"give one, or one for each of {points.shape[-2]} points")
+            raise InputError(
+                "sigma_px", f"of shape {sigma.shape}", f"give one, or one for each of {points.shape[-2]} points"
+            )
         if self.cov is not None:
             cov, n = np.asarray(self.cov, float), 2 * points.shape[-2]
             if cov.shape != (n, n) or not np.all(np.isfinite(cov)):

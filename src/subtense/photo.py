@@ -122,7 +122,9 @@ class Photo:
         _check_size(label, opened.width_px, opened.height_px, most_pixels)
         metadata, notes = _metadata(opened.tags(), told=opened.form == "")
         decoded = opened.decode()
-        _check_size(label, decoded.width_px, decoded.height_px, most_pixels)  # a container may hold another size than it tells
+        _check_size(
+            label, decoded.width_px, decoded.height_px, most_pixels
+        )  # a container may hold another size than it tells
         array = upright(decoded, label, pixels)
         photo = cls(array, metadata, path, hashlib.sha256(data).hexdigest(), notes, shown)
         return replace(photo, metadata=_without_margins(photo)) if opened.form == "RAW" else photo

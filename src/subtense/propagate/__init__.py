@@ -12,7 +12,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from .differences import Propagated, first_order
-from .measurement import measure
+from .measurement import DrawsNeeded, measure
 
 if TYPE_CHECKING:
     from .draws import Draws as Draws
@@ -31,7 +31,18 @@ _HOME = {
     "rows": "many",
 }
 
-__all__ = ["Draws", "Propagated", "first_order", "joint", "mean_of", "measure", "monte_carlo", "rows", "sample"]
+__all__ = [
+    "Draws",
+    "DrawsNeeded",
+    "Propagated",
+    "first_order",
+    "joint",
+    "mean_of",
+    "measure",
+    "monte_carlo",
+    "rows",
+    "sample",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -28,6 +28,10 @@ NEARLY_NORMAL = 0.1
 """Excess kurtosis up to which Cornish and Fisher's expansion is trusted; beyond it the laws are convolved."""
 
 
+class DrawsNeeded(Exception):
+    """An interval can only be had by draws, which take a while."""
+
+
 def measure(
     method: Method, inputs: Any, *, level: float = 0.95, seed: int = 0, draws: int | None = None, label: str = "",
     given: Mapping[str, Any] | None = None,
@@ -39,12 +43,13 @@ def measure(
         inputs: its Inputs, one scene.
         level: coverage of the intervals.
         seed: of the draws, where they are needed.
-        draws: how many; None for as many as the adaptive procedure wants.
+        draws: how many; None for as many as the adaptive procedure wants, 0 for none.
         label: which thing is measured.
         given: what to keep with each measurement, to measure again.
 
     Raises:
         GeometryError: this view has no finite answer.
+        DrawsNeeded: `draws` is 0, and without them an interval would be wrong.
     """
     if not 0.5 <= level <= HIGHEST_LEVEL:
         raise InputError("level", level, f"give a coverage from 0.5 to {HIGHEST_LEVEL}, as 0.95")
@@ -89,6 +94,8 @@ def _answers(
         if answer is not None:
             found[o] = answer
     bent = [o for o in range(len(method.outputs)) if o not in found]
+    if bent and draws == 0:
+        raise DrawsNeeded
     if bent:
         from .draws import adaptive, sample_space  # many measurements need none
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from contextlib import suppress
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import JSONResponse, Response
 
+from .. import propagate
 from ..document import Document
 from ..errors import GeometryError
 from ..photo import Photo
@@ -73,7 +76,7 @@ _CALC = answers(ref("document"), more={**reports(), "text/x-shellscript": {"sche
 
 
 @router.post("/calc", summary="The classical relation, solved for what is left out", responses=_CALC)
-def post_calc(body: Calc, form: Format = "json") -> Response:
+async def post_calc(body: Calc, form: Format = "json") -> Response:
     """distance = size x focal length in pixels / extent in pixels; `format` may also be `shell` or `python`."""
     texts = body.texts()
     inputs, image_height = calculator_input(texts)
@@ -81,12 +84,18 @@ def post_calc(body: Calc, form: Format = "json") -> Response:
         return Response(as_command(texts), media_type="text/x-shellscript")
     if form == "python":
         return Response(as_python(texts), media_type="text/x-python")
-    return shown(calculate(inputs, image_height=image_height, level=body.level, seed=body.seed), form)
+    known: dict[str, Any] = {"image_height": image_height, "level": body.level, "seed": body.seed}
+    try:  # a thread for a millisecond costs more than it saves; draws would keep others waiting
+        document = calculate(inputs, **known, draws=0)
+    except propagate.DrawsNeeded:
+        document = await run_in_threadpool(calculate, inputs, **known)
+    return shown(document, form) if form == "json" else await run_in_threadpool(shown, document, form)
 
 
 @router.post("/calc/curve", summary="The unknown over the extent, with its band", responses=gives(Curve))
 def post_curve(body: Calc) -> Response:
     """For a chart: 49 points over a factor of 20 each way, and the interval at each."""
     inputs, image_height = calculator_input(body.texts())
-    calculate(inputs, image_height=image_height, level=body.level, seed=body.seed)  # refuses what has no answer
+    with suppress(propagate.DrawsNeeded):  # refuses what has no answer
+        calculate(inputs, image_height=image_height, level=body.level, seed=body.seed, draws=0)
     return Response(json.dumps(curve(inputs, level=body.level), allow_nan=False), media_type="application/json")

@@ -26,8 +26,9 @@ _ALWAYS = ("range_m", "sensor_px_per_m", "focal_length_px", "object_m_per_px", "
 
 
 def calculate(
-    inputs: calculator.Inputs, *, image_height: Quantity | None = None, level: float = 0.95, seed: int = 0
-) -> Document:
+    inputs: calculator.Inputs, *, image_height: Quantity | None = None, level: float = 0.95, seed: int = 0,
+    draws: int | None = None,
+) -> Document:  # fmt: skip
     """Solve the classical relation for the value that was left out.
 
     Args:
@@ -35,8 +36,10 @@ def calculate(
         image_height: px, to check an extent along the height against; None if unknown.
         level: coverage of the intervals.
         seed: of the draws, where they are needed.
+        draws: how many; None for as many as are wanted, 0 for none.
 
     Raises:
+        DrawsNeeded: `draws` is 0, and without them an interval would be wrong.
         InputError: a value of 0 or below, an extent wider than the picture, several scenes at once.
         GeometryError: no finite answer.
     """
@@ -45,7 +48,7 @@ def calculate(
     _check(inputs, image_height)
     unknown = inputs.unknown
     method = _ANSWERING[unknown]
-    found = propagate.measure(method, inputs, level=level, seed=seed, given=given(inputs))
+    found = propagate.measure(method, inputs, level=level, seed=seed, draws=draws, given=given(inputs))
     values = {name: float(q.value) for name in calculator.UNKNOWNS if (q := getattr(inputs, name)) is not None}
     values[unknown] = found[0].value
     _check_answer(values, inputs, image_height)
