@@ -136,7 +136,9 @@ def test_points_that_do_not_fit_are_noted():
     """A sheet whose sides were exchanged, and clicks of the stated noise."""
     there = Pose(rotation_from_vector(np.array([0.6, 0.1, 0.05])), np.array([0.0, 0.02, 0.7]))
     q = Quantity.normal
-    sheet, other = (Target.rectangle(q(w, 1e-4, "m"), q(h, 1e-4, "m"), "sheet") for w, h in ((0.21, 0.297), (0.297, 0.21)))
+    sheet, other = (
+        Target.rectangle(q(w, 1e-4, "m"), q(h, 1e-4, "m"), "sheet") for w, h in ((0.21, 0.297), (0.297, 0.21))
+    )
     clicks = CAMERA.project(there.apply(sheet.points_m)) + np.random.default_rng(3).normal(0, 0.7, (4, 2))
     right, wrong = (pose.Inputs(CAMERA, Observation(clicks, 0.7), target) for target in (sheet, other))
     assert "points_misfit" not in {n.code for n in propagate.measure(pose.METHOD, right)[0].notes}

@@ -89,6 +89,7 @@ def test_a_link_restores_everything(visit):
     expect(page.locator("#along")).to_have_value("height")
     page.locator("#extent").fill("151 ± 3")
     expect(page.get_by_test_id("nominal")).to_have_text("13\u202f466.72 mm")
+    page.wait_for_timeout(400)
     link = page.evaluate("location.href")
     other = visit.context.new_page()
     other.goto(link)
