@@ -23,12 +23,17 @@ from ..arrays import Pixels
 from ..errors import SubtenseError
 
 SPARE_BYTES = 64 * 2**20
-"""What a child may write besides pixels."""
+"""What a decoder needs at the least, beside what this process has when it starts."""
 
 
 def main() -> None:
     """Limit this process, do what its one argument says, print the outcome."""
     task = json.loads(sys.argv[1])
+    most = int(task["limits"]["memory_bytes"])
+    if own_bytes() + SPARE_BYTES > most:  # it would die of anything, anywhere
+        text = f"{task['name']}: a decoder needs more than {most // 2**20} MiB of memory (memory_bytes)"
+        say(error={"type": "FileFormatError", "message": text, "name": "memory_bytes"})
+        return
     limit(task["limits"])
     try:
         say(result=TASKS[task["do"]](task))
@@ -44,6 +49,14 @@ def fault(error: SubtenseError, limits: dict[str, int]) -> dict[str, Any]:
     elif "million; the limit is" in text:
         name, text = "pixels", f"{text} (pixels)"
     return {"type": type(error).__name__, "message": text, "name": name}
+
+
+def own_bytes() -> int:
+    """Address space of this process before it has done anything; 0 where the system does not tell."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, AttributeError):
+        return 0
 
 
 def say(**words: Any) -> None:
