@@ -24,6 +24,11 @@ def street(examples):
 
 
 @pytest.fixture(scope="module")
+def desk(examples):
+    return Photo.load(examples / "desk.jpg")
+
+
+@pytest.fixture(scope="module")
 def camera(street):
     return resolve_camera(street)
 
@@ -227,3 +232,28 @@ def test_without_a_camera_only_what_needs_one_is_refused(street):
     assert {m.label for m in document.measurements} == {"same_plane 2"}
     [refused] = [n for n in document.notes if n.code == "refused"]
     assert refused.text.startswith("known_size 1: street.jpg: no camera")
+
+
+@pytest.mark.parametrize(("method", "field", "text", "says"), [
+    ("known_size", "size", "-5", "above 0"), ("known_size", "size", "0 mm", "above 0"), ("same_plane", "length", "-200 mm", "above 0"),
+    ("known_distance", "distance", "0", "above 0"), ("known_size", "tilt", "200", "-90° and 90°"),
+])  # fmt: skip
+def test_impossible_numbers_are_refused_by_their_field(desk, method, field, text, says):
+    points = {"known_size": {"ends": "500,466;857,535", "size": "200"}, "known_distance": {"ends": "500,466;857,535"},
+              "same_plane": {"reference": "100,100;300,100", "ends": "500,466;857,535"}}[method]  # fmt: skip
+    one = Item(METHODS[method], {**points, field: text})
+    with pytest.raises(InputError, match=says) as refused:
+        measure_item(one, desk, resolve_camera(desk))
+    assert refused.value.name == field
+
+
+def test_crossed_corners_are_refused(desk):
+    one = Item(METHODS["pose"], {"points": "394,372;756,822;748,368;296,842", "target": "rectangle 210 x 297"})
+    with pytest.raises(InputError, match="in order"):
+        measure_item(one, desk, resolve_camera(desk))
+
+
+def test_a_stated_tilt_is_not_called_unknown(desk):
+    one = Item(METHODS["known_size"], {"ends": "500,466;857,535", "size": "200", "tilt": "5"})
+    codes = {n.code for n in measure_item(one, desk, resolve_camera(desk)).measurements[0].notes}
+    assert "unknown_tilt" not in codes

@@ -17,6 +17,8 @@ REAL_SIZE = 0.005
 """Relative u of the real size of an object."""
 TILT_LIMIT_RAD = math.radians(20.0)
 """How far an object that seems to face the camera may be turned."""
+UNKNOWN_TILT = "assumed: within"
+"""How the source of a tilt begins of which nothing was said."""
 UNKNOWN_K1 = 0.02
 """u of the first radial distortion coefficient of a lens of which nothing is known (traps 16: 0.05 at most)."""
 UNKNOWN_CENTRE = 0.01
@@ -69,7 +71,7 @@ def frontal() -> Quantity:
 
 def unknown_tilt() -> Quantity:
     """The tilt of an object of which nothing was said: within 20 degrees either way."""
-    text = "assumed: within 20° of facing the camera"
+    text = f"{UNKNOWN_TILT} 20° of facing the camera"
     return Quantity.uniform(-TILT_LIMIT_RAD, TILT_LIMIT_RAD, "rad", text)
 
 

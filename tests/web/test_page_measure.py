@@ -434,3 +434,66 @@ def test_two_fingers_zoom(browser, server, examples):
     assert second.bounding_box()["x"] - first.bounding_box()["x"] > 1.5 * before
     visit.context.close()
     assert visit.unexpected() == []
+
+
+def test_what_is_typed_stays_with_its_measurement(visit, examples):
+    page = opened(visit, examples / "desk.jpg")
+    for y, size in ((250, "50 mm"), (420, "60 mm")):
+        draw(page, "Known size", (300, y), (500, y + 20))
+        field(page).fill(size)
+        expect(page.get_by_test_id("answer")).to_have_text(re.compile("mm"))
+    field(page).fill("77")
+    handle = page.locator("[data-handle='A-ends-0']").bounding_box()
+    page.mouse.click(handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2)
+    expect(field(page)).to_have_value("50 mm")
+    page.wait_for_timeout(600)
+    expect(field(page)).to_have_value("50 mm")
+    page.locator("table.rows").get_by_role("button", name="B", exact=True).click()
+    expect(field(page)).to_have_value("77")
+
+
+def test_an_end_whose_doubt_can_not_be_read_has_no_answer(visit, examples):
+    page = opened(visit, examples / "desk.jpg")
+    draw(page, "Known size", (300, 300), (500, 340))
+    field(page).fill("200 mm")
+    expect(page.get_by_test_id("answer")).to_have_text("698\u00a0mm")
+    sigma = page.get_by_label("Each end is known to")
+    for text in ("-1", "abc", "1e400", "0"):
+        sigma.fill(text)
+        expect(page.get_by_test_id("details").get_by_role("alert")).to_contain_text("pixels above 0")
+    sigma.fill("5 px")
+    expect(page.get_by_test_id("answer")).to_have_text(re.compile("69"))
+    expect(page.get_by_test_id("details")).to_contain_text("95 % 6")
+
+
+def test_a_photo_of_the_command_line_is_in_the_project_and_survives_it(browser, examples, tmp_path):
+    with serving(tmp_path / "one", str(examples / "desk.jpg")) as first:
+        visit = visiting(browser, first)
+        visit.expected = "ERR_CONNECTION|404|ERR_EMPTY"
+        page = visit.open("/measure")
+        expect(page.get_by_test_id("stage").locator("canvas").first).to_be_visible()
+        page.wait_for_timeout(800)
+        draw(page, "Known size", (300, 300), (500, 340))
+        field(page).fill("200 mm")
+        expect(page.get_by_test_id("answer")).to_have_text("698\u00a0mm")
+        page.locator("summary").filter(has_text="Save").click()
+        with page.expect_download() as saved:
+            page.get_by_role("button", name="Project with the pictures").click()
+        assert "data" in json.loads(saved.value.path().read_text())["sheets"][0]
+        first.stop()
+        with serving(tmp_path / "two", port=first.port, state=tmp_path / "one" / "state"):
+            page.wait_for_timeout(1500)
+            field(page).fill("400 mm")
+            expect(page.get_by_test_id("answer")).to_have_text(re.compile(r"1\.\d+"), timeout=15_000)
+            visit.context.close()
+
+
+def test_two_tabs_share_one_session(visit, examples):
+    page = opened(visit, examples / "desk.jpg")
+    other = visit.open("/measure")
+    expect(other.get_by_test_id("stage").locator("canvas").first).to_be_visible()
+    draw(page, "Known size", (300, 300), (500, 340))
+    expect(other.locator("[data-shape=A]")).to_be_visible()
+    other.wait_for_timeout(300)
+    draw(other, "Known size", (300, 400), (500, 440))
+    expect(page.locator("[data-shape=B]")).to_be_visible()

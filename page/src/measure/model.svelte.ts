@@ -2,7 +2,7 @@
 import { ApiError, get, Latest, post, send, type CameraSaid, type Doc, type GivenCamera, type MethodRow, type Note, type Photo, type Tables, type Target } from "../lib/api";
 import { store } from "../lib/store";
 import { Undo } from "../lib/undo";
-import { EMPTY, inputsOf, nextLabel, PROJECT, readProject, readSheet, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
+import { EMPTY, inputsOf, nextLabel, PROJECT, readProject, readSheet, sigmaOf, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
 
 export type Answer = { state: "done"; doc: Doc } | { state: "wants"; fields: string[] } | { state: "refused"; message: string; field: string | null } | { state: "waits" };
 
@@ -28,6 +28,10 @@ export class Model {
   busy: string[] = $state([]);
   ready = $state(false);
 
+  private answered: Record<string, { shape: Shape; camera: GivenCamera } | null> = $state.raw({});
+  private current = new Map<string, { shape: Shape; camera: GivenCamera }>();
+  private cameraAsked = new Map<string, number>();
+  private others = "BroadcastChannel" in globalThis ? new BroadcastChannel("subtense") : null;
   private history = new Undo<Session>(EMPTY);
   private asking = new Map<string, Latest<Asked, Doc>>();
   private saving: ReturnType<typeof setTimeout> | undefined;
@@ -53,7 +57,7 @@ export class Model {
     try {
       this.tables = await get<Tables>("/api/methods");
       const stored = (await store.session()) as Partial<Session> | undefined;
-      const sheets = (stored?.sheets ?? []).map(readSheet).filter((sheet): sheet is ProjectSheet => sheet !== null);
+      const sheets = readSheets(stored?.sheets);
       const held = (await get<{ photos: Photo[] }>("/api/photos")).photos;
       for (const photo of held) this.photos = { ...this.photos, [photo.id]: photo };
       const fresh = held.filter((photo) => photo.kept && !sheets.some((sheet) => sheet.photo.id === photo.id)).map(sheetOf);
@@ -65,12 +69,25 @@ export class Model {
       await Promise.all(all.map((sheet) => this.present(sheet)));
       this.measureAll();
     } catch (error) {
-      this.unreachable(error);
-      this.retrying = setTimeout(() => void this.start(), 1000);
+      this.ready = true;
+      const lost = this.unreachable(error);
+      clearTimeout(this.retrying);
+      if (lost) this.retrying = setTimeout(() => void this.start(), 1000);
+      else this.trouble = error instanceof Error ? error.message : String(error);
+      return;
     }
     this.ready = true;
     setInterval(() => void this.keep(), KEEP_EVERY_MS);
     setTimeout(() => void this.loadTargets(), 300);
+    if (this.others) this.others.onmessage = () => void this.follow();
+    for (const photo of Object.values(this.photos)) if (photo.kept) void this.fetchKept(photo);
+  }
+
+  /** The file of a photo named on the command line, so that projects and a new start of the server have it too. */
+  private async fetchKept(photo: Photo): Promise<void> {
+    if (await store.photo(photo.id)) return;
+    const response = await fetch(`/api/photos/${photo.id}/file`).catch(() => null);
+    if (response?.ok) await store.putPhoto(photo.id, { blob: await response.blob(), name: photo.name });
   }
 
   async loadTargets(): Promise<void> {
@@ -94,10 +111,17 @@ export class Model {
   }
 
   undo(): void {
+    this.settle();
     this.travel(this.history.undo());
   }
   redo(): void {
+    this.settle();
     this.travel(this.history.redo());
+  }
+
+  /** What was changed without a step of its own yet (keys, half a word) becomes one. */
+  private settle(): void {
+    if (this.session.sheets !== this.history.now.sheets) this.commit();
   }
 
   private travel(session: Session): void {
@@ -119,7 +143,19 @@ export class Model {
   }
 
   save(): void {
-    void store.putSession($state.snapshot(this.session));
+    void store.putSession($state.snapshot(this.session)).then(() => this.others?.postMessage("saved"));
+  }
+
+  /** Another tab of this browser has changed the session, which they share: take it over. */
+  private async follow(): Promise<void> {
+    const stored = (await store.session()) as Partial<Session> | undefined;
+    const sheets = readSheets(stored?.sheets);
+    const current = Math.max(sheets.findIndex((sheet) => sheet.photo.id === this.sheet?.photo.id), 0);
+    this.session = { sheets, current };
+    this.history.commit(this.session);
+    this.mark();
+    await Promise.all(sheets.map((sheet) => this.present(sheet)));
+    this.measureAll();
   }
 
   change(change: (sheet: Sheet) => Sheet, commit = true): void {
@@ -134,8 +170,10 @@ export class Model {
     if (shape && this.sheet) this.measure(shape, this.sheet);
   }
 
-  add(shapes: Omit<Shape, "id" | "label">[], labels: (string | undefined)[] = []): Shape[] {
-    const sheet = this.sheet;
+  /** New measurements in a photo, the current one unless another is named. */
+  add(shapes: Omit<Shape, "id" | "label">[], labels: (string | undefined)[] = [], photo = this.sheet?.photo.id): Shape[] {
+    const index = this.session.sheets.findIndex((one) => one.photo.id === photo);
+    const sheet = this.session.sheets[index];
     if (!sheet) return [];
     const made: Shape[] = [];
     shapes.forEach((shape, i) => {
@@ -143,9 +181,9 @@ export class Model {
       const taken = [...sheet.shapes, ...made].some((other) => other.label === wished);
       made.push({ ...shape, id: crypto.getRandomValues(new Uint32Array(2)).join("-"), label: wished && !taken ? wished : nextLabel([...sheet.shapes, ...made]) });
     });
-    this.change((old) => ({ ...old, shapes: [...old.shapes, ...made] }));
-    this.selected = made[0]?.id ?? null;
-    for (const shape of made) this.measure(shape, this.sheet!);
+    this.commit(withSheet(this.session, index, (old) => ({ ...old, shapes: [...old.shapes, ...made] })));
+    if (index === this.session.current) this.selected = made[0]?.id ?? null;
+    for (const shape of made) this.measure(shape, this.session.sheets[index]!);
     return made;
   }
 
@@ -167,7 +205,8 @@ export class Model {
 
   close(index: number): void {
     const sheets = this.session.sheets.filter((_, i) => i !== index);
-    this.commit({ sheets, current: Math.min(this.session.current, Math.max(sheets.length - 1, 0)) });
+    const current = this.session.current - (index < this.session.current ? 1 : 0);
+    this.commit({ sheets, current: Math.min(current, Math.max(sheets.length - 1, 0)) });
     this.selected = null;
   }
 
@@ -221,7 +260,11 @@ export class Model {
 
   private async resendNow(id: string): Promise<boolean> {
     const stored = await store.photo(id);
-    if (!stored) return false;
+    if (!stored) {
+      const { [id]: _gone, ...rest } = this.photos; // so that the page asks for the file
+      this.photos = rest;
+      return false;
+    }
     try {
       const photo = await send(stored.blob, stored.name);
       this.photos = { ...this.photos, [photo.id]: photo };
@@ -263,12 +306,15 @@ export class Model {
 
   async readCamera(sheet: Sheet): Promise<void> {
     const key = sheet.photo.id;
+    const turn = (this.cameraAsked.get(key) ?? 0) + 1;
+    this.cameraAsked.set(key, turn);
     try {
       const doc = await this.withPhoto(key, () => post<Doc>("/api/camera", { photo: key, camera: sheet.camera }));
+      if (this.cameraAsked.get(key) !== turn) return;
       const unknown = doc.camera ? undefined : doc.notes.find((note) => note.code === "unknown_camera");
       this.cameras = { ...this.cameras, [key]: { said: doc.camera, notes: doc.notes, error: unknown ? `${unknown.text}; ${unknown.cure}` : "" } };
     } catch (error) {
-      if (this.unreachable(error)) return;
+      if (this.unreachable(error) || this.cameraAsked.get(key) !== turn) return;
       this.cameras = { ...this.cameras, [key]: { said: null, notes: [], error: error instanceof Error ? error.message : String(error) } };
     }
   }
@@ -295,8 +341,10 @@ export class Model {
   measure(shape: Shape, sheet: Sheet): void {
     const row = this.method(shape.method);
     const missing = row ? wanting(shape, row) : [];
+    this.current.set(shape.id, { shape, camera: sheet.camera });
     if (!row) return this.tell(shape.id, { state: "refused", message: `this server has no method ${shape.method}`, field: null });
     if (missing.length) return this.tell(shape.id, { state: "wants", fields: missing });
+    if (sigmaOf(shape) === null) return this.tell(shape.id, { state: "refused", message: `each end is known to "${shape.sigma}"; give a number of pixels above 0`, field: "sigma" });
     const camera = this.cameras[sheet.photo.id];
     if (camera?.error && row.inputs.required.includes("camera")) return this.tell(shape.id, { state: "refused", message: camera.error, field: "camera" });
     if (!this.answers[shape.id]) this.tell(shape.id, { state: "waits" });
@@ -307,9 +355,9 @@ export class Model {
           this.withPhoto(sheet.photo.id, () =>
             post<Doc>(`/api/measure/${shape.method}`, { photo: sheet.photo.id, camera: sheet.camera, label: shape.label, inputs: inputsOf(shape) }),
           ),
-        (doc, { shape }) => this.tell(shape.id, { state: "done", doc }),
-        (error, { shape }) => {
-          if (this.unreachable(error)) return;
+        (doc, { shape, sheet }) => this.isNewest(shape, sheet) && this.tell(shape.id, { state: "done", doc }, shape, sheet),
+        (error, { shape, sheet }) => {
+          if (this.unreachable(error) || !this.isNewest(shape, sheet)) return;
           const field = error instanceof ApiError ? error.field : null;
           this.tell(shape.id, { state: "refused", message: error instanceof Error ? error.message : String(error), field });
         },
@@ -319,8 +367,21 @@ export class Model {
     asking.ask({ shape, sheet });
   }
 
-  private tell(id: string, answer: Answer): void {
+  private tell(id: string, answer: Answer, shape?: Shape, sheet?: Sheet): void {
     this.answers = { ...this.answers, [id]: answer };
+    this.answered = { ...this.answered, [id]: shape && sheet ? { shape, camera: sheet.camera } : null };
+  }
+
+  /** Whether nothing newer was asked of a measurement meanwhile. */
+  private isNewest(shape: Shape, sheet: Sheet): boolean {
+    const newest = this.current.get(shape.id);
+    return newest?.shape === shape && newest.camera === sheet.camera;
+  }
+
+  /** Whether the answer that is shown is that of the measurement as it stands. */
+  isCurrent(shape: Shape): boolean {
+    const of = this.answered[shape.id];
+    return !of || (of.shape === shape && of.camera === this.sheet?.camera);
   }
 
   /** The body of POST /api/measure for a sheet: what it has that can be measured. */
@@ -365,6 +426,12 @@ export class Model {
     }
     this.selected = null;
   }
+}
+
+/** Stored sheets that can be read, each photo once. */
+function readSheets(stored: unknown): Sheet[] {
+  const found = (Array.isArray(stored) ? stored : []).map(readSheet).filter((sheet): sheet is ProjectSheet => sheet !== null);
+  return found.filter((sheet, i) => found.findIndex((other) => other.photo.id === sheet.photo.id) === i);
 }
 
 function sheetOf(photo: Photo): Sheet {

@@ -56,11 +56,19 @@ export function isTool(method: MethodRow): boolean {
   return pointFields(method).length > 0;
 }
 
+/** The stated standard deviation of an end, px; undefined where nothing was said, null where it can't be read. */
+export function sigmaOf(shape: Shape): number | null | undefined {
+  const text = shape.sigma.trim().replace(",", ".").replace(/\s*px$/, "");
+  if (!text) return undefined;
+  const sigma = Number(text);
+  return Number.isFinite(sigma) && sigma > 0 && sigma < 1e4 ? sigma : null;
+}
+
 /** The `inputs` of a request. */
 export function inputsOf(shape: Shape): Record<string, unknown> {
   const inputs: Record<string, unknown> = {};
-  const sigma = Number(shape.sigma.replace(",", "."));
-  const stated = shape.sigma.trim() !== "" && Number.isFinite(sigma) && sigma >= 0;
+  const sigma = sigmaOf(shape);
+  const stated = typeof sigma === "number";
   const several = Object.keys(shape.points).length > 1;
   for (const [name, points] of Object.entries(shape.points)) {
     inputs[name] = shape.seen?.[name] ?? {
@@ -182,6 +190,8 @@ export function readSheet(value: unknown): ProjectSheet | null {
   if (!(camera === null || isText(camera) || (isText(camera.name) && isText(camera.content, 2 ** 20)))) return null;
   const shapes = sheet.shapes.map(readShape);
   if (shapes.some((shape) => shape === null)) return null;
+  const ids = new Set(shapes.map((shape) => shape!.id));
+  if (ids.size < shapes.length) return null;
   const { name, width_px, height_px, sha256 } = photo;
   const kept = { id: sha256.slice(0, 32), name, width_px, height_px, sha256 };
   return { photo: kept, camera, shapes: shapes as Shape[], ...(typeof sheet.data === "string" ? { data: sheet.data } : {}) };
@@ -191,6 +201,7 @@ function readShape(value: unknown): Shape | null {
   const shape = value as Shape | null;
   if (!shape || !isText(shape.id) || !isText(shape.label) || !isText(shape.method) || typeof shape.points !== "object") return null;
   const points = Object.entries(shape.points ?? {});
+  if (!points.length || points.some(([, list]) => !list.length)) return null;
   if (!points.every(([, list]) => Array.isArray(list) && list.every(isPoint))) return null;
   const texts = Object.entries(shape.texts ?? {});
   if (!texts.every(([, text]) => isText(text))) return null;

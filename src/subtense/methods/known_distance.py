@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays import Array, Codes
-from ..assumptions import frontal, unknown_tilt
+from ..assumptions import UNKNOWN_TILT, frontal, unknown_tilt
 from ..camera import Camera
 from ..focus import NO_EXTENSION, close_focus, thin_lens
 from ..geometry import segment_depth
@@ -89,7 +89,7 @@ def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
     if float(inputs.tilt.value) == 0 and float(inputs.tilt.u) == 0:
         found.append(Note("frontal_assumption", "the object is taken to face the camera; turned by 10° it is 1.5 % longer than "
                           "that, by 20° 6 %", 'state its tilt, as in --tilt "0 ± 20 deg (limits)"'))  # fmt: skip
-    elif inputs.tilt.source.startswith("assumed"):
+    elif inputs.tilt.source.startswith(UNKNOWN_TILT):
         found.append(Note("unknown_tilt", "the object's tilt is unknown; up to 20° is in the interval, which reaches to the long "
                           "side; turned further, it is longer than the interval says",
                           'state it, as in --tilt "0 ± 3 deg", or use a reference in its plane'))  # fmt: skip

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..arrays import Array, Codes
-from ..assumptions import frontal, unknown_tilt
+from ..assumptions import UNKNOWN_TILT, frontal, unknown_tilt
 from ..camera import Camera
 from ..focus import NO_EXTENSION, close_focus, thin_lens
 from ..geometry import segment_depth
@@ -134,7 +134,7 @@ def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
     if tilt == 0 and u_tilt == 0:
         found.append(Note("frontal_assumption", "the object is taken to face the camera; turned by 10° it reads 1.5 % "
                           "too far, by 20° 6 %", 'state its tilt, as in --tilt "0 ± 20 deg (limits)"'))  # fmt: skip
-    elif inputs.tilt.source.startswith("assumed"):
+    elif inputs.tilt.source.startswith(UNKNOWN_TILT):
         limit = math.degrees(u_tilt * math.sqrt(3))
         found.append(Note("unknown_tilt", f"the object's tilt is unknown; up to {limit:.0f}° is in the interval, which "
                           "reaches to the near side; turned further, the distance is only an upper bound",

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..arrays import Array, Bools, Codes
-from ..assumptions import frontal, unknown_tilt
+from ..assumptions import UNKNOWN_TILT, frontal, unknown_tilt
 from ..camera import Camera
 from ..lenses import LENSES
 from ..method import Method, Output, Reason, reasons
@@ -97,7 +97,7 @@ def notes(inputs: Inputs, _: Result) -> tuple[Note, ...]:
     angles = (inputs.turn, inputs.tip)
     exact = [not (float(angle.value) or float(angle.u)) for angle in angles]
     assumed = [angle.source.startswith("assumed") for angle in angles]
-    if any(a and not e for a, e in zip(assumed, exact, strict=True)):
+    if any(angle.source.startswith(UNKNOWN_TILT) for angle in angles):
         found.append(Note("unknown_tilt", "how the plane is turned is unknown; up to 20° each way is in the interval",
                           "hold the camera square to the plane and state it, as in 0 ± 3 deg, or lay the reference beside what "
                           "is wanted and in its direction"))  # fmt: skip

@@ -35,6 +35,7 @@ class Held:
         levels: pixels at full size, half, a quarter, ... down to one tile.
         folder: its own; gone with it.
         kept: whether it stays without a page (it was named on the command line).
+        source: the file, of a photo that is kept.
         asked_s: when it was last asked for, monotonic clock.
         tiles: the tiles that were cut already.
         cameras: cameras that were resolved already, by what was given.
@@ -45,6 +46,7 @@ class Held:
     levels: tuple[Pixels, ...]
     folder: Path
     kept: bool = False
+    source: Path | None = None
     asked_s: float = 0.0
     tiles: dict[tuple[int, int, int, str], bytes] = field(default_factory=dict)
     cameras: dict[str, Any] = field(default_factory=dict)
@@ -128,12 +130,11 @@ class Photos:
         old = self.held.get(held.id)
         if old is not None:
             shutil.rmtree(held.folder, ignore_errors=True)
-            old.kept, old.asked_s, old.photo = (
-                old.kept or kept,
-                time.monotonic(),
-                replace(old.photo, name=held.photo.name),
-            )
+            old.kept, old.asked_s = old.kept or kept, time.monotonic()
+            old.photo = replace(old.photo, name=held.photo.name)
+            old.source = source if kept else old.source
             return old
+        held.source = source if kept else None
         self.held[held.id] = held
         self.sweep()
         return held
@@ -150,7 +151,7 @@ class Photos:
             start += 3 * width * height
         notes = tuple(Note(**note) for note in made["notes"])
         photo = Photo(levels[0], Metadata(**made["metadata"]), Path(name), str(made["digest"]), notes, name)
-        return Held(photo.digest[:32], photo, tuple(levels), folder, kept, time.monotonic())
+        return Held(photo.digest[:32], photo, tuple(levels), folder, kept, asked_s=time.monotonic())
 
 
 def tile(held: Held, level: int, column: int, row: int, form: str) -> bytes | None:

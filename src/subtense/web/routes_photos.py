@@ -97,6 +97,18 @@ def delete_photo(request: Request, photo: Id) -> Response:
 
 
 _BYTES = {"schema": {"type": "string", "format": "binary"}}
+_FILE: dict[int | str, dict[str, Any]] = {200: {"description": "the file", "content": {"application/octet-stream": {}}}}
+
+
+@router.get("/photos/{photo}/file", summary="The file of a photo named on the command line", responses=_FILE)
+def get_file(request: Request, photo: Id) -> Response:
+    """For projects, and for the browser to keep; what was sent is not kept here."""
+    source = held(request, photo).source
+    if source is None or not source.is_file():
+        raise AbsentError("the file of this photo is not kept here")
+    return Response(source.read_bytes(), media_type="application/octet-stream", headers={"cache-control": "no-store"})
+
+
 _TILE: dict[int | str, Any] = {200: {"description": "the tile", "content": {"image/jpeg": _BYTES, "image/png": _BYTES}}}
 Count = Annotated[int, InPath(ge=0, le=10**6)]
 

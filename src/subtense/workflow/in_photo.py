@@ -6,6 +6,7 @@ What a person types here gets the same defaults as in `measure`; the photo's cam
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .. import assumptions, propagate
+from ..arrays import Array
 from ..camera import Camera
 from ..document import Document, Shape
 from ..errors import InputError, SubtenseError, UnknownCameraError
@@ -114,7 +116,9 @@ def _with_defaults(method: Method, values: Mapping[str, Any], *, in_photo: bool)
             unit, how = field.metadata["unit"], field.metadata.get("assume")
             assume = getattr(assumptions, how) if how else None
             bare = BARE.get(unit) if how else NAMED.get(unit)
-            found[field.name] = Quantity.parse(value, unit, bare=bare, name=field.name, assume=assume)
+            found[field.name] = _sensible(
+                Quantity.parse(value, unit, bare=bare, name=field.name, assume=assume), field.name, value
+            )
         elif isinstance(value, str) and kinds[field.name] is Target:
             found[field.name] = Target.parse(value, name=field.name, assume=assumptions.size)
         elif value is None and in_photo and "in_photo" in field.metadata:
@@ -122,10 +126,32 @@ def _with_defaults(method: Method, values: Mapping[str, Any], *, in_photo: bool)
     return found
 
 
+def _sensible(quantity: Quantity, name: str, text: str) -> Quantity:
+    """A length above 0, an angle short of edge-on."""
+    value = float(quantity.value)
+    if quantity.unit == "m" and not value > 0:
+        raise InputError(name, text, "give a length above 0")
+    if quantity.unit == "rad" and not abs(value) < math.pi / 2:
+        raise InputError(name, text, "give an angle between -90° and 90°")
+    return quantity
+
+
+def _check_uncrossed(name: str, points_px: Array) -> None:
+    """Four corners set in order go round their figure one way; crossed ones are in a wrong order, and fit a false pose."""
+    edge = np.roll(points_px, -1, axis=0) - points_px
+    following = np.roll(edge, -1, axis=0)
+    turn = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
+    if np.any(turn > 0) and np.any(turn < 0):
+        ends = ";".join(f"{x:g},{y:g}" for x, y in points_px)
+        raise InputError(name, ends, "the corners of a rectangle must go round it in order, none inside the others")
+
+
 def _check_inside(photo: Photo, inputs: Any) -> None:
     limit = np.array([photo.width_px, photo.height_px]) - 0.5
     for field in dataclasses.fields(inputs):
         seen = getattr(inputs, field.name)
+        if isinstance(seen, Observation) and field.metadata.get("closed") and seen.points_px.shape == (4, 2):
+            _check_uncrossed(field.name, seen.points_px)
         if isinstance(seen, Observation) and (np.any(seen.points_px < -0.5) or np.any(seen.points_px > limit)):
             ends = ";".join(f"{x:g},{y:g}" for x, y in seen.points_px.reshape(-1, 2))
             raise InputError(
