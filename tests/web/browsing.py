@@ -5,7 +5,7 @@ import shutil
 from dataclasses import dataclass, field
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, Response
+from playwright.sync_api import Browser, BrowserContext, Page, Response, expect
 from running import STATIC, Server
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -13,6 +13,7 @@ ARGUMENTS = [
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1",
 ]  # fmt: skip
+expect.set_options(timeout=15_000)  # a busy machine may take seconds for draws
 SIZES = {"desktop": (1280, 860), "phone": (390, 800)}
 
 in_browser = pytest.mark.skipif(
