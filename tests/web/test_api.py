@@ -602,3 +602,8 @@ def test_who_leaves_a_job_early_stops_nothing(server, desk):
     with server.client.stream("GET", f"/api/jobs/{job}/events") as answer:
         next(answer.iter_text())
     assert events(server, job)[-1][0] == "done"
+
+
+def test_the_file_of_a_sent_photo_is_not_kept(server):
+    held = server.photo(picture(40, 30, seed=77))
+    assert error(server.client.get(f"/api/photos/{held['id']}/file"), 404)["type"] == "Absent"

@@ -97,10 +97,15 @@ def delete_photo(request: Request, photo: Id) -> Response:
 
 
 _BYTES = {"schema": {"type": "string", "format": "binary"}}
-_FILE: dict[int | str, dict[str, Any]] = {200: {"description": "the file", "content": {"application/octet-stream": {}}}}
+_FILE: dict[int | str, Any] = {200: {"description": "the file", "content": {"application/octet-stream": _BYTES}}}
 
 
-@router.get("/photos/{photo}/file", summary="The file of a photo named on the command line", responses=_FILE)
+@router.get(
+    "/photos/{photo}/file",
+    summary="The file of a photo named on the command line",
+    responses=_FILE,
+    response_class=Response,
+)
 def get_file(request: Request, photo: Id) -> Response:
     """For projects, and for the browser to keep; what was sent is not kept here."""
     source = held(request, photo).source
