@@ -73,7 +73,7 @@ class Opened:
     """A picture whose head is read and whose pixels are not yet.
 
     Attributes:
-        form: "HEIC", "RAW", or "" for what Pillow decodes.
+        form: "HEIC", "RAW", or Pillow's name of the format.
         width_px: width by the head.
         height_px: height by the head.
         tags: reads the EXIF tags, by number; gives None where they are damaged. Some stand behind the pixels and decode them,
@@ -249,7 +249,8 @@ def _open_other(data: bytes, label: object) -> Opened:
         orientation = left if left in range(1, 9) else 1
         return Decoded(*_size_px(picture), orientation, lambda top, bottom: _strip(picture, top, bottom))
 
-    return Opened("", *_size_px(picture), lambda: _exif_tags(picture), decode)
+    form = "JPEG" if picture.format == "MPO" else str(picture.format)  # an MPO is a JPEG with others behind it
+    return Opened(form, *_size_px(picture), lambda: _exif_tags(picture), decode)
 
 
 def _exif_tags(picture: Any) -> dict[int, Any] | None:

@@ -6,7 +6,6 @@ Positions and serial numbers in a file are never read.
 from __future__ import annotations
 
 import hashlib
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,43 +13,15 @@ from typing import Any
 from .arrays import Pixels
 from .decode import Buffer, open_picture, upright
 from .errors import FileFormatError
+from .metadata import Metadata, metadata_of, text_of
 from .quantity import Note
+
+__all__ = ["MOST_PIXELS", "Metadata", "Photo"]
 
 MOST_PIXELS = 250_000_000
 MOST_BYTES = 512 * 2**20
 MARGINS = 0.02
 """A RAW is developed with the sensor's margins, so it is by up to that larger than the size in its tags."""
-
-
-@dataclass(frozen=True)
-class Metadata:
-    """What a file says of its camera; None where it says nothing usable. Lengths in mm as in the tags.
-
-    Attributes:
-        make: camera maker.
-        model: camera model.
-        lens: lens model.
-        focal_mm: focal length.
-        f35_mm: focal length in 35 mm equivalents.
-        focal_plane_x_per_mm: pixels per mm on the sensor along the stored width.
-        focal_plane_y_per_mm: the same along the stored height.
-        tagged_width_px: stored width by the EXIF tags.
-        tagged_height_px: stored height by the EXIF tags.
-        digital_zoom: ratio; 1 for none.
-        orientation: 1 to 8: from the frame that the other tags are in to the upright picture, whoever applied it.
-    """
-
-    make: str | None = None
-    model: str | None = None
-    lens: str | None = None
-    focal_mm: float | None = None
-    f35_mm: float | None = None
-    focal_plane_x_per_mm: float | None = None
-    focal_plane_y_per_mm: float | None = None
-    tagged_width_px: int | None = None
-    tagged_height_px: int | None = None
-    digital_zoom: float | None = None
-    orientation: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +91,7 @@ class Photo:
         data = _bytes(path, label)
         opened = open_picture(data, label, Path(name or path).suffix)
         _check_size(label, opened.width_px, opened.height_px, most_pixels)
-        metadata, notes = _metadata(opened.tags(), told=opened.form == "")
+        metadata, notes = _metadata(opened.tags(), opened.form)
         decoded = opened.decode()
         _check_size(
             label, decoded.width_px, decoded.height_px, most_pixels
@@ -132,7 +103,7 @@ class Photo:
 
 def _shown(name: str | None) -> str:
     """The last part of a name, on one line: it may be a stranger's."""
-    return _text((name or "").replace("\\", "/").rsplit("/", 1)[-1]) or ""
+    return text_of((name or "").replace("\\", "/").rsplit("/", 1)[-1]) or ""
 
 
 def _check_size(label: object, width_px: int, height_px: int, most_pixels: int) -> None:
@@ -162,31 +133,12 @@ def _bytes(path: Path, label: object) -> bytes:
 # -- metadata --------------------------------------------------------------------------------------------
 
 
-def _metadata(tags: dict[int, Any] | None, told: bool) -> tuple[Metadata, tuple[Note, ...]]:
-    """The tags, each on its own: one damaged value does not hide the others.
-
-    Args:
-        tags: by number; None where they are damaged.
-        told: whether the orientation tag turns the picture, so that an invalid one matters.
-    """
+def _metadata(tags: dict[int, Any] | None, form: str) -> tuple[Metadata, tuple[Note, ...]]:
+    """What the tags say; `form` is that of `Opened`."""
     if tags is None:
-        return Metadata(), (
-            Note("metadata_damaged", "the file's metadata can't be read", "give the camera with --camera"),
-        )
-    orientation = tags.get(0x0112, 1)
-    notes: tuple[Note, ...] = ()
-    if orientation not in range(1, 9):
-        notes = (Note("orientation_invalid", f"the orientation tag is {str(orientation)[:20]!r}, not 1 to 8; the picture is "
-                      "taken as it is stored", "check that it is upright"),) if told else ()  # fmt: skip
-        orientation = 1
-    per_mm = {2: 1 / 25.4, 3: 0.1, 4: 1.0, 5: 1000.0}.get(tags.get(0xA210, 2))
-    return Metadata(
-        make=_text(tags.get(0x010F)), model=_text(tags.get(0x0110)), lens=_text(tags.get(0xA434)),
-        focal_mm=_positive(tags.get(0x920A)), f35_mm=_positive(tags.get(0xA405)),
-        focal_plane_x_per_mm=_scaled(tags.get(0xA20E), per_mm), focal_plane_y_per_mm=_scaled(tags.get(0xA20F), per_mm),
-        tagged_width_px=_whole(tags.get(0xA002)), tagged_height_px=_whole(tags.get(0xA003)),
-        digital_zoom=_positive(tags.get(0xA404)), orientation=int(orientation),
-    ), notes  # fmt: skip
+        note = Note("metadata_damaged", "the file's metadata can't be read", "give the camera with --camera")
+        return Metadata(form=form), (note,)
+    return metadata_of(tags, told=form not in ("HEIC", "RAW"), form=form)
 
 
 def _without_margins(photo: Photo) -> Metadata:
@@ -197,29 +149,3 @@ def _without_margins(photo: Photo) -> Metadata:
     then, now = sorted((tags.tagged_width_px, tags.tagged_height_px)), sorted(photo.stored_size_px)
     near = all(abs(now[i] / then[i] - 1) < MARGINS for i in range(2))
     return replace(tags, tagged_width_px=None, tagged_height_px=None) if near else tags
-
-
-def _text(value: Any) -> str | None:
-    """A tag's text, printable and short."""
-    if not isinstance(value, str):
-        return None
-    shown = " ".join("".join(c if c.isprintable() else " " for c in value[:4096]).split())[:100]
-    return shown or None
-
-
-def _positive(value: Any) -> float | None:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, ZeroDivisionError, OverflowError):
-        return None
-    return number if math.isfinite(number) and number > 0 else None
-
-
-def _whole(value: Any) -> int | None:
-    number = _positive(value)
-    return int(number) if number else None
-
-
-def _scaled(value: Any, factor: float | None) -> float | None:
-    number = _positive(value)
-    return number * factor if number and factor else None

@@ -161,10 +161,9 @@ def decode(task: dict[str, Any]) -> dict[str, Any]:
     say(progress=0.7)
     sizes = _pyramid(made[0], task["tile_px"])
     made[0].flush()
-    metadata = {name: value for name, value in vars(photo.metadata).items() if value is not None}
     return {
         "digest": photo.digest,
-        "metadata": metadata,
+        "metadata": photo.metadata.to_json(),
         "notes": [note.to_json() for note in photo.notes],
         "sizes": sizes,
     }

@@ -150,7 +150,7 @@ class Photos:
             levels.append(np.memmap(path, np.uint8, "r", start, (height, width, 3)))
             start += 3 * width * height
         notes = tuple(Note(**note) for note in made["notes"])
-        photo = Photo(levels[0], Metadata(**made["metadata"]), Path(name), str(made["digest"]), notes, name)
+        photo = Photo(levels[0], Metadata.from_json(made["metadata"]), Path(name), str(made["digest"]), notes, name)
         return Held(photo.digest[:32], photo, tuple(levels), folder, kept, asked_s=time.monotonic())
 
 
