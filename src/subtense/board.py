@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Indices
 from .errors import InputError
 
 KINDS = ("chessboard", "charuco", "circles", "aprilgrid")
@@ -122,7 +122,7 @@ class BoardView:
     name: str
     width_px: int
     height_px: int
-    ids: Array
+    ids: Indices
     points_px: Array
     sigma_px: Array
     source: str = "stated"
