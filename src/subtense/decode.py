@@ -23,9 +23,10 @@ import numpy as np
 
 from .arrays import Pixels
 from .errors import FileFormatError, InputError, MissingExtraError
-from .tiff_tags import camera_tags, is_raw_tiff, raw_camera_tags
+from .tiff_tags import camera_tags, is_raw_tiff, preview_size, raw_camera_tags, xmp_packet
 
 MOST_EXIF_BYTES = 2**20
+MOST_XMP_BYTES = 2**22
 STRIP_PIXELS = 2**20
 FORMATS = ("JPEG", "PNG", "TIFF", "WEBP", "BMP", "AVIF")
 """What Pillow decodes here."""
@@ -69,6 +70,23 @@ class Decoded:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """What a file tells of its camera beside the EXIF tags.
+
+    Attributes:
+        xmp: the packet.
+        preview_px: width and height of the preview within.
+        densities: pixels along a length in x and y, the unit of both the same.
+        intrinsic_matrix: 3 x 3 row by row, px, from a HEIC.
+    """
+
+    xmp: bytes | None = None
+    preview_px: tuple[int, int] | None = None
+    densities: tuple[float, float] | None = None
+    intrinsic_matrix: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
 class Opened:
     """A picture whose head is read and whose pixels are not yet.
 
@@ -78,6 +96,7 @@ class Opened:
         height_px: height by the head.
         tags: reads the EXIF tags, by number; gives None where they are damaged. Some stand behind the pixels and decode them,
             so the size is looked at first.
+        beside: reads what else is told.
         decode: decodes the pixels.
     """
 
@@ -85,6 +104,7 @@ class Opened:
     width_px: int
     height_px: int
     tags: Callable[[], dict[int, Any] | None]
+    beside: Callable[[], Beside]
     decode: Callable[[], Decoded]
 
 
@@ -136,7 +156,7 @@ def _guarded(
     except Exception as error:
         told = error.args[0] if error.args else ""
         reason = " ".join((told.decode("utf-8", "replace") if isinstance(told, bytes) else str(error)).split())[:80]
-        raise FileFormatError(label, f"{what} ({reason}); {cure}") from None
+        raise FileFormatError(label, f"{what} ({reason}); {cure}", code="partial_file") from None
 
 
 def _array(pixels: Buffer | None, height_px: int, width_px: int, label: object) -> Pixels:
@@ -239,7 +259,8 @@ def _open_other(data: bytes, label: object) -> Opened:
         try:
             picture = Image.open(io.BytesIO(data), formats=FORMATS)
         except Exception:
-            raise FileFormatError(label, _what_it_is(data)) from None
+            reason = _what_it_is(data)
+            raise FileFormatError(label, reason, code="partial_file" if "damaged" in reason else None) from None
 
     def decode() -> Decoded:
         with _pillow_without_its_own_limit(), _guarded(label):
@@ -250,7 +271,7 @@ def _open_other(data: bytes, label: object) -> Opened:
         return Decoded(*_size_px(picture), orientation, lambda top, bottom: _strip(picture, top, bottom))
 
     form = "JPEG" if picture.format == "MPO" else str(picture.format)  # an MPO is a JPEG with others behind it
-    return Opened(form, *_size_px(picture), lambda: _exif_tags(picture), decode)
+    return Opened(form, *_size_px(picture), lambda: _exif_tags(picture), lambda: _beside(picture), decode)
 
 
 def _exif_tags(picture: Any) -> dict[int, Any] | None:
@@ -263,6 +284,34 @@ def _exif_tags(picture: Any) -> dict[int, Any] | None:
             return {**exif, **exif.get_ifd(0x8769), 0x0112: exif.get(0x0112, 1)}
     except Exception:  # metadata readers raise undocumented exceptions
         return None
+
+
+_EXTENDED_XMP = b"http://ns.adobe.com/xmp/extension/\0"
+
+
+def _beside(picture: Any) -> Beside:
+    info = picture.info
+    packet = info.get("xmp")
+    packet = packet.encode("utf-8", "replace") if isinstance(packet, str) else packet
+    exif = info.get("exif") or b""
+    preview = preview_size(exif, 6 if exif.startswith(b"Exif\0\0") else 0) if isinstance(exif, bytes) else None
+    densities = info.get("jfif_density") or info.get("aspect") or info.get("dpi")
+    return Beside(packet if isinstance(packet, bytes) else _extended_xmp(picture), preview,
+                  tuple(densities) if densities and len(densities) == 2 else None)  # fmt: skip
+
+
+def _extended_xmp(picture: Any) -> bytes | None:
+    """The part of a JPEG's XMP that did not fit into its first packet, joined; None where there is none.
+
+    Source: XMP specification part 3, 1.1.3.1: after the signature a digest of 32 letters, the whole length, an offset.
+    """
+    pieces = [
+        s[len(_EXTENDED_XMP) :]
+        for app, s in getattr(picture, "applist", ())
+        if app == "APP1" and s.startswith(_EXTENDED_XMP)
+    ]
+    joined = sorted((int.from_bytes(piece[36:40], "big"), piece[40:]) for piece in pieces)
+    return b"".join(data for _, data in joined)[:MOST_XMP_BYTES] or None
 
 
 def _strip(picture: Any, top: int, bottom: int) -> Pixels:
@@ -323,7 +372,23 @@ def _open_heic(data: bytes, label: object) -> Opened:
         array = array.reshape(*array.shape[:2], -1)[:height, :width]
         return Decoded(width, height, 1, lambda top, bottom: _heic_rows(array[top:bottom], picture.mode))
 
-    return Opened("HEIC", *_size_px(picture), tags, decode)
+    def beside() -> Beside:
+        found = picture.info.get("xmp")
+        return Beside(
+            found if isinstance(found, bytes) else None,
+            intrinsic_matrix=_matrix(picture.info.get("camera_intrinsic_matrix")),
+        )
+
+    return Opened("HEIC", *_size_px(picture), tags, beside, decode)
+
+
+def _matrix(told: Any) -> tuple[float, ...] | None:
+    """The camera matrix row by row, as libheif has it for the picture as it is looked at."""
+    if not isinstance(told, dict):
+        return None
+    f = [float(told.get(name, 0.0)) for name in ("focal_length_x", "focal_length_y")]
+    c = [float(told.get(name, 0.0)) for name in ("principal_point_x", "principal_point_y", "skew")]
+    return f[0], c[2], c[0], 0.0, f[1], c[1], 0.0, 0.0, 1.0
 
 
 def _heic_rows(array: Pixels, mode: str) -> Pixels:
@@ -364,7 +429,7 @@ def _open_raw(data: bytes, label: object) -> Opened:
         return Decoded(array.shape[1], array.shape[0], 1, lambda top, bottom: array[top:bottom])
 
     # the limit on size is one on the whole sensor, which is what takes memory
-    return Opened("RAW", sizes.raw_width, sizes.raw_height, tags, decode)
+    return Opened("RAW", sizes.raw_width, sizes.raw_height, tags, lambda: Beside(xmp_packet(data)), decode)
 
 
 def _dotted(version: tuple[int, ...]) -> str:

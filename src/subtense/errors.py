@@ -44,10 +44,11 @@ class UnknownCameraError(SubtenseError):
 
     Attributes:
         tried: (source, why it failed) for each camera source.
+        code: of the note that says so: "no_focal_length", "panorama", "perspective_edited", or "unknown_camera".
     """
 
-    def __init__(self, message: str, tried: tuple[tuple[str, str], ...] = ()) -> None:
-        self.tried = tried
+    def __init__(self, message: str, tried: tuple[tuple[str, str], ...] = (), *, code: str = "unknown_camera") -> None:
+        self.tried, self.code = tried, code
         super().__init__(message)
 
 
@@ -86,10 +87,11 @@ class FileFormatError(SubtenseError, ValueError):
     Attributes:
         path: the file.
         reason: what is wrong with it, and where.
+        code: machine-readable, where there is one: "partial_file" for a picture that is cut or damaged.
     """
 
-    def __init__(self, path: object, reason: str) -> None:
-        self.path, self.reason = str(path), reason
+    def __init__(self, path: object, reason: str, *, code: str | None = None) -> None:
+        self.path, self.reason, self.code = str(path), reason, code
         super().__init__(f"{path}: {reason}")
 
 

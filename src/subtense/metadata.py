@@ -12,7 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from .decode import Beside
 from .quantity import Note
+from .tiff_tags import apple_acceleration
 
 MOST_TEXT = 4096
 """Characters of a tag that are looked at."""
@@ -45,6 +47,7 @@ class Metadata:
         orientation: 1 to 8: from the frame that the other tags are in to the upright picture, whoever applied it.
         pixel_aspect: width of a pixel over its height, in the stored frame, by the file's resolutions.
         thumbnail_size_px: width and height of the preview within, as stored.
+        custom_rendered: how the camera made the picture: 6 is a panorama, by Apple.
         form: "JPEG", "PNG", "TIFF", "WEBP", "AVIF", "BMP", "HEIC", "RAW": the pipeline the pixels came out of.
         intrinsic_matrix: 3 x 3 camera matrix row by row, px of the upright picture, origin its outer top-left corner; of a
             HEIC that carries one.
@@ -71,6 +74,7 @@ class Metadata:
     orientation: int = 1
     pixel_aspect: float | None = None
     thumbnail_size_px: tuple[int, int] | None = None
+    custom_rendered: int | None = None
     form: str = ""
     intrinsic_matrix: tuple[float, ...] | None = None
     gravity_g: tuple[float, float, float] | None = None
@@ -84,36 +88,63 @@ class Metadata:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Metadata:
         """The inverse of `to_json`: JSON has lists for tuples."""
-        known: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in data.items()}
+        known: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in data.items()
+        }
         return cls(**known)
 
 
-def metadata_of(tags: Mapping[int, Any], *, told: bool, **also: Any) -> tuple[Metadata, tuple[Note, ...]]:
-    """The tags, each on its own: one damaged value does not hide the others.
+_BY_XMP = {
+    0x010F: "tiff:Make", 0x0110: "tiff:Model", 0x0131: "tiff:Software", 0x920A: "exif:FocalLength", 0xA405: "exif:FocalLengthIn35mmFilm",
+    0xA002: "exif:PixelXDimension", 0xA003: "exif:PixelYDimension", 0xA20E: "exif:FocalPlaneXResolution", 0x829D: "exif:FNumber",
+    0xA20F: "exif:FocalPlaneYResolution", 0xA210: "exif:FocalPlaneResolutionUnit", 0xA404: "exif:DigitalZoomRatio",
+    0x9206: "exif:SubjectDistance", 0xA434: "exifEX:LensModel", 0xA433: "exifEX:LensMake",
+}  # fmt: skip
+"""EXIF tags that XMP repeats: what a PNG or a converted file has of them."""
+
+
+def metadata_of(
+    tags: Mapping[int, Any], beside: Beside, xmp: Mapping[str, str], *, form: str
+) -> tuple[Metadata, tuple[Note, ...]]:
+    """All that is told, each on its own: one damaged value does not hide the others.
 
     Args:
         tags: EXIF, by number.
-        told: whether the orientation tag turns the picture, so that an invalid one matters.
-        also: fields that are not EXIF.
+        beside: what else the file tells.
+        xmp: properties of its XMP packet; they stand in where EXIF is silent.
+        form: the format, as in `Metadata`.
     """
-    orientation = tags.get(0x0112, 1)
-    notes: tuple[Note, ...] = ()
-    if orientation not in range(1, 9):
-        notes = (Note("orientation_invalid", f"the orientation tag is {str(orientation)[:20]!r}, not 1 to 8; the picture is "
-                      "taken as it is stored", "check that it is upright"),) if told else ()  # fmt: skip
-        orientation = 1
-    unit = tags.get(0xA210, 2)
-    per_mm = {2: 1 / 25.4, 3: 0.1, 4: 1.0, 5: 1000.0}.get(unit) if isinstance(unit, int) else None
+    tags = {**{tag: xmp[name] for tag, name in _BY_XMP.items() if name in xmp}, **tags}
+    orientation, notes = _orientation(tags.get(0x0112, 1), turns=form not in ("HEIC", "RAW"))
+    per_mm = {2: 1 / 25.4, 3: 0.1, 4: 1.0, 5: 1000.0}.get(whole(tags.get(0xA210, 2)) or 0)
     focal, apertures = lens_specification(tags.get(0xA432))
     return Metadata(
-        make=text_of(tags.get(0x010F)), model=text_of(tags.get(0x0110)), lens=text_of(tags.get(0xA434)),
-        lens_make=text_of(tags.get(0xA433)), software=text_of(tags.get(0x0131)),
+        make=text_of(tags.get(0x010F)), model=text_of(tags.get(0x0110)), lens=text_of(tags.get(0xA434)) or text_of(xmp.get("aux:Lens")),
+        lens_make=text_of(tags.get(0xA433)), software=text_of(tags.get(0x0131)) or text_of(xmp.get("xmp:CreatorTool")),
         focal_mm=positive(tags.get(0x920A)), f35_mm=positive(tags.get(0xA405)), f_number=positive(tags.get(0x829D)),
         subject_distance_m=_distance(tags.get(0x9206)), lens_focal_mm=focal, lens_f_number=apertures,
         focal_plane_x_per_mm=_scaled(tags.get(0xA20E), per_mm), focal_plane_y_per_mm=_scaled(tags.get(0xA20F), per_mm),
         tagged_width_px=whole(tags.get(0xA002)), tagged_height_px=whole(tags.get(0xA003)),
-        digital_zoom=positive(tags.get(0xA404)), orientation=int(orientation), **also,
+        digital_zoom=positive(tags.get(0xA404)), orientation=orientation, form=form,
+        custom_rendered=whole(tags.get(0xA401)), pixel_aspect=_pixel_aspect(tags, beside), thumbnail_size_px=beside.preview_px,
+        intrinsic_matrix=beside.intrinsic_matrix, gravity_g=apple_acceleration(tags.get(0x927C)), xmp=dict(xmp),
     ), notes  # fmt: skip
+
+
+def _orientation(value: Any, turns: bool) -> tuple[int, tuple[Note, ...]]:
+    """1 to 8; an invalid one is noted where the tag is what turns the picture."""
+    if value in range(1, 9):
+        return int(value), ()
+    note = Note("orientation_invalid", f"the orientation tag is {str(value)[:20]!r}, not 1 to 8; the picture is "
+                "taken as it is stored", "check that it is upright")  # fmt: skip
+    return 1, (note,) if turns else ()
+
+
+def _pixel_aspect(tags: Mapping[int, Any], beside: Beside) -> float | None:
+    """By the EXIF resolutions, unless the picture's own format tells of pixels that are not square."""
+    own = pixel_aspect(*beside.densities) if beside.densities else None
+    told = pixel_aspect(tags.get(0x011A), tags.get(0x011B))
+    return own if told is None or (own is not None and own != 1.0) else told
 
 
 def text_of(value: Any) -> str | None:
@@ -125,9 +156,10 @@ def text_of(value: Any) -> str | None:
 
 
 def number(value: Any) -> float | None:
-    """A finite number."""
+    """A finite number, also one that is written as a fraction."""
     try:
-        found = float(value)
+        above, slash, below = value.partition("/") if isinstance(value, str) else (value, "", "")
+        found = float(above) / float(below) if slash else float(above)
     except (TypeError, ValueError, ZeroDivisionError, OverflowError):
         return None
     return found if math.isfinite(found) else None

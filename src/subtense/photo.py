@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from .arrays import Pixels
-from .decode import Buffer, open_picture, upright
+from .decode import Buffer, Opened, open_picture, upright
 from .errors import FileFormatError
 from .metadata import Metadata, metadata_of, text_of
 from .quantity import Note
@@ -91,7 +91,7 @@ class Photo:
         data = _bytes(path, label)
         opened = open_picture(data, label, Path(name or path).suffix)
         _check_size(label, opened.width_px, opened.height_px, most_pixels)
-        metadata, notes = _metadata(opened.tags(), opened.form)
+        metadata, notes = _metadata(opened)
         decoded = opened.decode()
         _check_size(
             label, decoded.width_px, decoded.height_px, most_pixels
@@ -133,12 +133,25 @@ def _bytes(path: Path, label: object) -> bytes:
 # -- metadata --------------------------------------------------------------------------------------------
 
 
-def _metadata(tags: dict[int, Any] | None, form: str) -> tuple[Metadata, tuple[Note, ...]]:
-    """What the tags say; `form` is that of `Opened`."""
-    if tags is None:
-        note = Note("metadata_damaged", "the file's metadata can't be read", "give the camera with --camera")
-        return Metadata(form=form), (note,)
-    return metadata_of(tags, told=form not in ("HEIC", "RAW"), form=form)
+def _metadata(opened: Opened) -> tuple[Metadata, tuple[Note, ...]]:
+    """What the file tells; a damaged part of it is noted and does not hide the others."""
+    tags, beside = opened.tags(), opened.beside()
+    properties = _properties(beside.xmp)
+    told = metadata_of(tags or {}, beside, properties or {}, form=opened.form)
+    if tags is not None and properties is not None:
+        return told
+    what = "metadata" if tags is None else "XMP metadata"
+    note = Note("metadata_damaged", f"the file's {what} can't be read", "give the camera with --camera")
+    return told[0], (*told[1], note)
+
+
+def _properties(packet: bytes | None) -> dict[str, str] | None:
+    """The XMP properties; the reader is imported only where there is a packet."""
+    if not packet:
+        return {}
+    from .xmp import camera_properties
+
+    return camera_properties(packet)
 
 
 def _without_margins(photo: Photo) -> Metadata:
