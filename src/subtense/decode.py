@@ -133,7 +133,7 @@ def upright(decoded: Decoded, label: object, pixels: Buffer | None = None) -> Pi
     size = (decoded.height_px, decoded.width_px)
     height, width = size[::-1] if decoded.orientation >= 5 else size
     out = _array(pixels, height, width, label)
-    stored = _as_stored(out, decoded.orientation)
+    stored = as_stored(out, decoded.orientation)
     rows_at_once = max(1, STRIP_PIXELS // decoded.width_px)
     with _guarded(label):
         for top in range(0, decoded.height_px, rows_at_once):
@@ -171,7 +171,7 @@ def _array(pixels: Buffer | None, height_px: int, width_px: int, label: object) 
     return out
 
 
-def _as_stored(out: Pixels, orientation: int) -> Pixels:
+def as_stored(out: Pixels, orientation: int) -> Pixels:
     """A view of the upright array in the frame of the file, so that writing into it turns.
 
     EXIF orientation: 2 mirrored, 3 half turn, 4 mirrored top to bottom, 5 to 8 with a quarter turn.

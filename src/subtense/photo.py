@@ -10,8 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .arrays import Pixels
-from .decode import Buffer, Opened, open_picture, upright
+from .decode import Buffer, Opened, as_stored, open_picture, upright
 from .errors import FileFormatError
 from .metadata import Metadata, metadata_of, text_of
 from .quantity import Note
@@ -63,6 +65,13 @@ class Photo:
         """Width and height as stored, before the orientation was applied."""
         size = (self.width_px, self.height_px)
         return size[::-1] if self.metadata.orientation >= 5 else size
+
+    def as_stored(self) -> Photo:
+        """The same with pixels in the frame of the file, as the camera's sensor has them: what a calibration is of."""
+        if self.metadata.orientation == 1:
+            return self
+        turned = np.ascontiguousarray(as_stored(self.pixels, self.metadata.orientation))
+        return replace(self, pixels=turned, metadata=replace(self.metadata, orientation=1))
 
     def to_json(self) -> dict[str, Any]:
         """Name, size and digest: no path, no position, no serial number."""
