@@ -127,7 +127,7 @@ class Problem:
 
     def _block(self, camera: int) -> _Block:
         mine = [s for s in self.sights if s.camera == camera]
-        shape = (self.frames, max(s.view.ids.size for s in mine))
+        shape = (self.frames, max((s.view.ids.size for s in mine), default=1))
         ids, seen, weight = np.zeros(shape, int), np.zeros((*shape, 2)), np.zeros(shape)
         for s in mine:
             n = s.view.ids.size
@@ -332,11 +332,11 @@ def _normal(problem: Problem, state: State) -> _Normal:
     for camera, block in enumerate(problem.blocks):
         pixels, by_global, by_board = linearised(problem, state, camera, block.ids)
         weight = np.repeat(block.weight[..., None], 2, -1).reshape(frames, -1, 1)
-        present = weight > 0
-        jg = np.where(present, by_global[..., free].reshape(frames, -1, n) * weight, 0.0)
-        jb = np.where(present, by_board.reshape(frames, -1, 6) * weight, 0.0)
-        r = np.where(present, (pixels - block.seen_px).reshape(frames, -1, 1) * weight, 0.0)
-        flat = jg.reshape(-1, n)
+        present, rows = weight > 0, weight.shape[1]
+        jg = np.where(present, by_global[..., free].reshape(frames, rows, n) * weight, 0.0)
+        jb = np.where(present, by_board.reshape(frames, rows, 6) * weight, 0.0)
+        r = np.where(present, (pixels - block.seen_px).reshape(frames, rows, 1) * weight, 0.0)
+        flat = jg.reshape(frames * rows, n)
         u += flat.T @ flat
         w += jg.swapaxes(1, 2) @ jb
         v += jb.swapaxes(1, 2) @ jb
@@ -358,10 +358,30 @@ def _step(normal: _Normal, damping: float) -> tuple[Array, Array]:
     return step, poses
 
 
-def reduced_information(normal: _Normal) -> Array:
+def _reduced(normal: _Normal) -> Array:
     """The information on the global unknowns when every board pose is unknown."""
     wv = np.linalg.solve(normal.v, normal.w.swapaxes(1, 2)).swapaxes(1, 2)
     return np.asarray(normal.u - np.einsum("fik,fjk->ij", wv, normal.w))
+
+
+def reduced(problem: Problem, state: State) -> tuple[Array, list[Array]]:
+    """The information on the free global unknowns with all poses unknown, and how each point's pixels enter the right side.
+
+    Returns:
+        (n, n), and per camera (frames, points, n, 2): the right side moves by this times a shift of the point in px.
+    """
+    normal = _normal(problem, state)
+    wv = np.linalg.solve(normal.v, normal.w.swapaxes(1, 2)).swapaxes(1, 2)
+    gains = []
+    for camera, block in enumerate(problem.blocks):
+        _, by_global, by_board = linearised(problem, state, camera, block.ids)
+        apart = by_global[..., problem.free] - np.einsum("fik,fpdk->fpdi", wv, by_board)
+        gains.append(
+            np.where(
+                block.weight[..., None, None] > 0, apart.swapaxes(-1, -2) * block.weight[..., None, None] ** 2, 0.0
+            )
+        )
+    return _reduced(normal), gains
 
 
 def inverse(information: Array) -> Array:
@@ -466,7 +486,7 @@ def _covariance(problem: Problem, state: State, chi2: float) -> tuple[Array, int
         raise GeometryError(f"{count // 2} points can't tell {problem.free.size + 6 * problem.frames} unknowns: take more "
                             "pictures", code="too_few_views")  # fmt: skip
     cov = np.zeros((problem.size, problem.size))
-    cov[np.ix_(problem.free, problem.free)] = inverse(reduced_information(_normal(problem, state))) * chi2 / dof
+    cov[np.ix_(problem.free, problem.free)] = inverse(_reduced(_normal(problem, state))) * chi2 / dof
     return cov, dof
 
 
@@ -484,7 +504,7 @@ def start_state(problem: Problem) -> State:
     firsts = found[0][1]
     relative = []
     for camera in range(1, len(found)):
-        relative.append(_relative(problem, camera, firsts, found[camera][1]))
+        relative.append(_relative(firsts, found[camera][1]))
         for frame, pose in found[camera][1].items():  # frames that the first camera did not see
             if frame not in firsts:
                 firsts[frame] = _chained(relative[-1].inverse(), pose)
@@ -502,7 +522,7 @@ def _chained(a_from_b: Pose, b_from_c: Pose) -> Pose:
     )
 
 
-def _relative(problem: Problem, camera: int, firsts: dict[int, Pose], own: dict[int, Pose]) -> Pose:
+def _relative(firsts: dict[int, Pose], own: dict[int, Pose]) -> Pose:
     """camera_from_first by the median over the frames that both saw."""
     both = sorted(set(firsts) & set(own))
     if not both:
