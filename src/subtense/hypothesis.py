@@ -10,10 +10,15 @@ import numpy as np
 
 from .assumptions import UNKNOWN_CENTRE, UNKNOWN_K1
 from .camera import Camera
+from .errors import InputError
 from .quantity import Note
 
 if TYPE_CHECKING:
     from .photo import Photo
+
+
+SAME_PROPORTIONS = 0.005
+"""Two sizes are taken as one picture, resized, where width / height differs by no more than that."""
 
 
 @dataclass(frozen=True)
@@ -58,16 +63,51 @@ def unknown_lens(
                   source=source, nominal_focal_m=nominal_focal_m, part_sources=_ASSUMED)  # fmt: skip
 
 
-def scaled_to(camera: Camera, photo: Photo) -> tuple[Camera, tuple[Note, ...]] | str:
-    """The camera for a photo of another size and the same proportions, or why that can't be."""
+_TURNS = {1: 0, 3: 2, 6: 1, 8: 3}
+"""Clockwise quarter turns from the stored picture to the upright one, by EXIF orientation; the others mirror it."""
+
+
+def scaled_to(camera: Camera, photo: Photo, frame: str = "") -> tuple[Camera, tuple[Note, ...]] | str:
+    """The camera for a photo that is turned, or of another size and the same proportions; or why that can't be.
+
+    Args:
+        camera: of a calibration.
+        photo: the picture.
+        frame: "stored" where the calibration is of pictures before their EXIF orientation, "upright" where of those after
+            it; empty to go by the size: the upright picture's, else that of the stored one.
+    """
     size = (photo.width_px, photo.height_px)
+    stored = frame == "stored" or (not frame and not _alike(camera, size) and _alike(camera, photo.stored_size_px))
+    turned: tuple[Note, ...] = ()
+    if stored and photo.metadata.orientation != 1:
+        upright = _turned(camera, photo.metadata.orientation)
+        if isinstance(upright, str):
+            return upright
+        camera, turned = upright
     if (camera.width_px, camera.height_px) == size:
-        return camera, ()
+        return camera, turned
     was = f"{camera.width_px} x {camera.height_px} px"
-    sx, sy = size[0] / camera.width_px, size[1] / camera.height_px
-    if abs(sx / sy - 1) > 0.005:
-        turned = " (it is turned by a quarter)" if size == (camera.height_px, camera.width_px) else ""
-        return f"it is for {was}, and the photo has {size[0]} x {size[1]} px{turned}"
+    if not _alike(camera, size):
+        other = " (it is turned by a quarter)" if size == (camera.height_px, camera.width_px) else ""
+        return f"it is for {was}, and the photo has {size[0]} x {size[1]} px{other}"
     note = Note("calibration_size_mismatch", f"the camera is for {was}; it was scaled to the photo's size, which is right if "
                 "the photo was resized and wrong if another mode of the camera took it", "calibrate at this size")  # fmt: skip
-    return camera.resized(*size), (note,)
+    return camera.resized(*size), (*turned, note)
+
+
+def _alike(camera: Camera, size_px: tuple[int, int]) -> bool:
+    """Whether a size has the proportions of the camera's."""
+    return abs(size_px[0] * camera.height_px / (size_px[1] * camera.width_px) - 1) <= SAME_PROPORTIONS
+
+
+def _turned(camera: Camera, orientation: int) -> tuple[Camera, tuple[Note, ...]] | str:
+    """A camera of stored pictures, turned as the photo was."""
+    if orientation not in _TURNS:
+        return f"it is for the picture as stored, and the photo's orientation ({orientation}) mirrors that"
+    try:
+        turned = camera.rotated(_TURNS[orientation])
+    except InputError as error:
+        return f"it is for the picture as stored and can't be turned: {error}"
+    degrees = 90 * _TURNS[orientation]
+    text = f"the camera is for the picture as stored; it was turned by {degrees}° as the photo's orientation says"
+    return turned, (Note("calibration_turned", text, "none is needed if the calibration's pictures were not turned"),)

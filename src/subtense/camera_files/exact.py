@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from ..camera import Camera
 
@@ -29,7 +29,7 @@ def moved_centre_px(camera: Camera, offset: float) -> tuple[float, float]:
     return x, y
 
 
-def shortened(k: Sequence[float], counts: Sequence[int]) -> list[float] | None:
+def shortened(k: Iterable[float], counts: Sequence[int]) -> list[float] | None:
     """Coefficients as one of these numbers of them: as many as there are, else the fewest that hold all but zeros."""
     k = [float(c) for c in k]
     if len(k) in counts:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..camera import Camera
+from ..camera_files import selector
+from ..camera_files.formats import ENDINGS
 from ..camera_sources import calibration_file, exif_35mm, exif_focal_plane, typed
 from ..errors import InputError, UnknownCameraError
 from ..hypothesis import Hypothesis
@@ -97,14 +98,15 @@ def resolve_camera(photo: Photo, given: str | SentFile | None = None, *, paths: 
 
 def _given(text: str | SentFile, photo: Photo, *, paths: bool) -> Hypothesis:
     if isinstance(text, SentFile):
-        return calibration_file.camera(Path(text.name), photo, text.content)
+        sent, pick = selector.split(text.name, there=False)
+        return calibration_file.camera(sent, photo, text.content, pick)
     if not text.strip():
         raise InputError("--camera", text, WHAT_TO_GIVE)
     if not paths:
         return typed.camera(text, photo)
-    path = Path(text)
-    if path.suffix.lower() in (".json", ".yaml", ".yml", ".xml", ".txt") or ("=" not in text and path.is_file()):
-        return calibration_file.camera(path, photo)
+    path, pick = selector.split(text)
+    if path.suffix.lower() in ENDINGS or ("=" not in text and path.is_file()):
+        return calibration_file.camera(path, photo, pick=pick)
     return typed.camera(text, photo)
 
 
