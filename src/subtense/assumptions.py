@@ -19,8 +19,8 @@ TILT_LIMIT_RAD = math.radians(20.0)
 """How far an object that seems to face the camera may be turned."""
 UNKNOWN_TILT = "assumed: within"
 """How the source of a tilt begins of which nothing was said."""
-UNKNOWN_K1 = 0.02
-"""u of the first radial distortion coefficient of a lens of which nothing is known (traps 16: 0.05 at most)."""
+UNKNOWN_K1 = 0.05
+"""u of the first radial distortion coefficient of a lens of which nothing is known; `lens_class` tells better."""
 UNKNOWN_CENTRE = 0.01
 """u of the principal point in picture widths, where the picture's middle stands for it."""
 ROUNDED = math.sqrt(3.0)
@@ -85,7 +85,7 @@ LISTED: tuple[tuple[str, str], ...] = (
     ("tilt of an object in a photo", "within 20° either way, as limits; `calc` takes it as facing the camera"),
     ("focus extension of a nominal focal length", "`measure` adds all of the thin-lens value and takes as much for its u; "
      "`calc` leaves it out and takes its full size as a one-sided limit"),
-    ("lens distortion of a camera known from metadata only", f"k1 = 0 with u = {UNKNOWN_K1}"),
+    ("lens distortion of a camera known from metadata only", f"k1 = 0 with u = {UNKNOWN_K1}; phone 0.02, industrial 0.1, action 0.25"),
     ("principal point of such a camera", "the middle of the picture, 1 % of its width (1s)"),
     ("counts of pixels", "exact"),
 )  # fmt: skip

@@ -30,12 +30,14 @@ class Hypothesis:
         camera: of the upright picture; None where the source has nothing.
         reason: how it was had, or why it was not.
         notes: doubts.
+        either: where the tags may be read in two ways, a camera for each; `camera` then holds both in its u.
     """
 
     source: str
     camera: Camera | None
     reason: str
     notes: tuple[Note, ...] = ()
+    either: tuple[Camera, ...] = ()
 
     @property
     def relative_u(self) -> float:
@@ -43,24 +45,36 @@ class Hypothesis:
         return self.camera.u_f_px / float(self.camera.f_px) if self.camera else math.inf
 
 
-_ASSUMED = {
-    "principal point": f"assumed: the middle of the picture, to {UNKNOWN_CENTRE:.0%} of its width".replace("%", " %"),
-    "lens distortion": f"assumed: none, k1 to {UNKNOWN_K1}",
-}
+ASSUMED_DISTORTION = "assumed: none"
+"""How the source of a distortion begins of which nothing is known."""
+_CENTRE = f"assumed: the middle of the picture, to {UNKNOWN_CENTRE:.0%} of its width".replace("%", " %")
 
 
 def unknown_lens(
-    width_px: int, height_px: int, f_px: float, u_f_px: float, source: str, nominal_focal_m: float | None = None
-) -> Camera:
+    width_px: int, height_px: int, f_px: float, u_f_px: float, source: str, nominal_focal_m: float | None = None, *,
+    k1_u: float = UNKNOWN_K1, lens: str = "",
+) -> Camera:  # fmt: skip
     """A camera of which only the focal length is known: the rest is assumed, with its u.
 
     The principal point is the picture's middle, and the distortion k1 = 0, both doubtful (see `assumptions`).
+
+    Args:
+        width_px: picture width.
+        height_px: picture height.
+        f_px: focal length.
+        u_f_px: its u.
+        source: what to call it.
+        nominal_focal_m: where f_px stands for focus at infinity.
+        k1_u: u of k1, as the lens's class has it (see `lens_class`).
+        lens: what kind of lens that is.
     """
     cov = np.zeros((9, 9))
     centre = UNKNOWN_CENTRE * max(width_px, height_px)
-    cov[[0, 2, 3, 4], [0, 2, 3, 4]] = u_f_px**2, centre**2, centre**2, UNKNOWN_K1**2
+    cov[[0, 2, 3, 4], [0, 2, 3, 4]] = u_f_px**2, centre**2, centre**2, k1_u**2
+    distortion = f"{ASSUMED_DISTORTION}, k1 to {k1_u:.2g}" + (f" ({lens})" if lens else "")
     return Camera(width_px, height_px, f_px, (width_px - 1) / 2, (height_px - 1) / 2, lens="brown_conrady", cov=cov,
-                  source=source, nominal_focal_m=nominal_focal_m, part_sources=_ASSUMED)  # fmt: skip
+                  source=source, nominal_focal_m=nominal_focal_m,
+                  part_sources={"principal point": _CENTRE, "lens distortion": distortion})  # fmt: skip
 
 
 _TURNS = {1: 0, 3: 2, 6: 1, 8: 3}

@@ -36,6 +36,7 @@ class Metadata:
         focal_mm: focal length.
         f35_mm: focal length in 35 mm equivalents.
         f_number: aperture.
+        exposure_s: exposure time.
         subject_distance_m: focus distance, as the camera tells it.
         lens_focal_mm: shortest and longest focal length of the lens.
         lens_f_number: its largest apertures at these.
@@ -63,6 +64,7 @@ class Metadata:
     focal_mm: float | None = None
     f35_mm: float | None = None
     f_number: float | None = None
+    exposure_s: float | None = None
     subject_distance_m: float | None = None
     lens_focal_mm: tuple[float, float] | None = None
     lens_f_number: tuple[float, float] | None = None
@@ -98,7 +100,7 @@ _BY_XMP = {
     0x010F: "tiff:Make", 0x0110: "tiff:Model", 0x0131: "tiff:Software", 0x920A: "exif:FocalLength", 0xA405: "exif:FocalLengthIn35mmFilm",
     0xA002: "exif:PixelXDimension", 0xA003: "exif:PixelYDimension", 0xA20E: "exif:FocalPlaneXResolution", 0x829D: "exif:FNumber",
     0xA20F: "exif:FocalPlaneYResolution", 0xA210: "exif:FocalPlaneResolutionUnit", 0xA404: "exif:DigitalZoomRatio",
-    0x9206: "exif:SubjectDistance", 0xA434: "exifEX:LensModel", 0xA433: "exifEX:LensMake",
+    0x9206: "exif:SubjectDistance", 0x829A: "exif:ExposureTime", 0xA434: "exifEX:LensModel", 0xA433: "exifEX:LensMake",
 }  # fmt: skip
 """EXIF tags that XMP repeats: what a PNG or a converted file has of them."""
 
@@ -122,7 +124,7 @@ def metadata_of(
         make=text_of(tags.get(0x010F)), model=text_of(tags.get(0x0110)), lens=text_of(tags.get(0xA434)) or text_of(xmp.get("aux:Lens")),
         lens_make=text_of(tags.get(0xA433)), software=text_of(tags.get(0x0131)) or text_of(xmp.get("xmp:CreatorTool")),
         focal_mm=positive(tags.get(0x920A)), f35_mm=positive(tags.get(0xA405)), f_number=positive(tags.get(0x829D)),
-        subject_distance_m=_distance(tags.get(0x9206)), lens_focal_mm=focal, lens_f_number=apertures,
+        exposure_s=positive(tags.get(0x829A)), subject_distance_m=_distance(tags.get(0x9206)), lens_focal_mm=focal, lens_f_number=apertures,
         focal_plane_x_per_mm=_scaled(tags.get(0xA20E), per_mm), focal_plane_y_per_mm=_scaled(tags.get(0xA20F), per_mm),
         tagged_width_px=whole(tags.get(0xA002)), tagged_height_px=whole(tags.get(0xA003)),
         digital_zoom=positive(tags.get(0xA404)), orientation=orientation, form=form,

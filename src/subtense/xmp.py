@@ -37,7 +37,7 @@ _PIX4D = (
 )
 _EXIF = (
     "FocalLength FocalLengthIn35mmFilm PixelXDimension PixelYDimension FocalPlaneXResolution FocalPlaneYResolution "
-    "FocalPlaneResolutionUnit DigitalZoomRatio FNumber SubjectDistance"
+    "FocalPlaneResolutionUnit DigitalZoomRatio FNumber ExposureTime SubjectDistance"
 )
 _MODEL = (
     "FocalLengthX FocalLengthY ImageWidth ImageHeight PrincipalPointX PrincipalPointY Skew PixelAspectRatio Distortion "

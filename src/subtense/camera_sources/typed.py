@@ -15,14 +15,16 @@ from .. import assumptions
 from ..camera import Camera
 from ..errors import InputError
 from ..hypothesis import Hypothesis, unknown_lens
+from ..lens_class import k1_u, lens_class
 from ..photo import Photo
 from ..presets import Preset, find_preset
 from ..quantity import Note, Quantity
 from ..tagged_size import tagged_size
+from ..told_camera import told_camera
 
 NAME = "typed"
-CUT_U = 0.04
-"""Relative u where a picture does not have its sensor's proportions (traps 8: a 16:9 picture may be 8 % off)."""
+CUT_U = 0.08
+"""Relative u where a picture does not have its sensor's proportions: a 16:9 mode of a 4:3 sensor was seen 8 % off either way."""
 KEYS = ("f", "sensor", "fov")
 
 
@@ -70,10 +72,14 @@ def _from_pixels(text: str, photo: Photo) -> Camera:
 
     f = Quantity.parse(text, "px", name="--camera f", assume=assume)
     _above_zero("--camera f", f, text)
-    made = unknown_lens(
-        photo.width_px, photo.height_px, float(f.value), float(f.u), f"focal length in pixels, {f.source}"
-    )
-    return made
+    return _of_this_picture(photo, float(f.value), float(f.u), f"focal length in pixels, {f.source}")
+
+
+def _of_this_picture(photo: Photo, f_px: float, u_f_px: float, source: str, nominal_m: float | None = None) -> Camera:
+    """A camera whose focal length is that of the upright picture, with the distortion that its class of lens may have."""
+    corner = math.hypot(photo.width_px, photo.height_px) / 2 / f_px
+    return unknown_lens(photo.width_px, photo.height_px, f_px, u_f_px, source, nominal_m,
+                        k1_u=k1_u(photo.metadata, corner), lens=lens_class(photo.metadata).title)  # fmt: skip
 
 
 def _from_field_of_view(text: str, photo: Photo) -> Camera:
@@ -84,19 +90,19 @@ def _from_field_of_view(text: str, photo: Photo) -> Camera:
         raise InputError("--camera fov", text, "give the angle across the picture's width, 1 to 175 deg")
     f_px = photo.width_px / 2 / math.tan(angle / 2)
     u = float(fov.u) * photo.width_px / 4 / math.sin(angle / 2) ** 2
-    return unknown_lens(photo.width_px, photo.height_px, f_px, math.hypot(u, assumptions.NOMINAL_FOCAL * f_px),
-                        f"field of view across the width, {fov.source}",
-                        photo.metadata.focal_mm / 1000 if photo.metadata.focal_mm else None)  # fmt: skip
+    return _of_this_picture(photo, f_px, math.hypot(u, assumptions.NOMINAL_FOCAL * f_px),
+                            f"field of view across the width, {fov.source}",
+                            photo.metadata.focal_mm / 1000 if photo.metadata.focal_mm else None)  # fmt: skip
 
 
 def _from_lengths(focal: Quantity, sensor: Quantity, photo: Photo, source: str) -> Camera:
-    """f_px = f * W / sensor width, W the side that lies along the sensor's width, corrected for a digital zoom."""
+    """f_px = f * W / sensor width, W the whole picture's side that lies along the sensor's width; corrected for a digital zoom."""
     _above_zero("--camera f", focal, f"{float(focal.value)} m")
     _above_zero("--camera sensor", sensor, f"{float(sensor.value)} m")
     size = tagged_size(photo)
-    f_px = float(focal.value) / float(sensor.value) * max(photo.stored_size_px) * size.zoom
-    relative = math.hypot(float(focal.u / focal.value), float(sensor.u / sensor.value), size.relative_u)
-    return unknown_lens(photo.width_px, photo.height_px, f_px, relative * f_px, source, float(focal.value))
+    f_px = float(focal.value) / float(sensor.value) * max(size.whole_px) * size.zoom
+    relative = math.hypot(float(focal.u / focal.value), float(sensor.u / sensor.value))
+    return replace(told_camera(photo, f_px, relative, source, size), nominal_focal_m=float(focal.value), id=None)
 
 
 def _tagged_focal(text: str, photo: Photo) -> Quantity:
