@@ -103,17 +103,73 @@ def calc(form: str, files: tuple[Path, ...], level: float, seed: int, **text: st
     _show(calculate(inputs, image_height=image_height, level=level, seed=seed), form, files)
 
 
-@main.command()
+class _UnnamedContext(click.Context):
+    """That of a command without a name, which leaves a space less in the path to it."""
+
+    @property
+    def command_path(self) -> str:
+        return super().command_path.strip()
+
+
+class _Unnamed(click.Command):
+    context_class = _UnnamedContext
+
+
+class _Camera(click.Group):
+    """`camera PHOTO` with options of its own, or one of the commands below it."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """What is no command's name is a photo or an option of the command without a name."""
+        if not (args and (args[0] in self.commands or args[0] in ctx.help_option_names)):
+            args = [_UNNAMED, *args]
+        return super().parse_args(ctx, args)
+
+    def collect_usage_pieces(self, ctx: click.Context) -> list[str]:
+        """Both ways to call it."""
+        return ["PHOTO [OPTIONS]", "|", *super().collect_usage_pieces(ctx)[1:]]
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The options of the command without a name, then the commands."""
+        self.commands[_UNNAMED].format_options(ctx, formatter)
+        self.format_commands(ctx, formatter)
+
+
+_UNNAMED = ""
+
+
+@main.group(cls=_Camera, epilog="Example: subtense camera examples/desk.jpg")
+def camera() -> None:
+    """Which camera took PHOTO, by every source: what was chosen, why, and what the others say."""
+
+
+@camera.command(_UNNAMED, cls=_Unnamed, hidden=True)
 @click.argument("photo", type=click.Path(path_type=Path))
 @click.option("--camera", metavar="CAMERA", help="What is known of it; see `subtense measure --help`.")
 @click.option("--format", "form", default="text", show_default=True, help="text, json or csv.")
-def camera(photo: Path, camera: str | None, form: str) -> None:
+def camera_of(photo: Path, camera: str | None, form: str) -> None:
     """Which camera took PHOTO, by every source: what was chosen, why, and what the others say."""
     from .photo import Photo
     from .workflow.measure import camera_document
 
     picture = Photo.load(photo)
     _show(camera_document(picture, camera), form, photo=picture)
+
+
+@camera.command(epilog="Example: subtense camera convert calib.yml#640x480 cameras.txt")
+@click.argument("source", metavar="A")
+@click.argument("target", metavar="B", type=click.Path(path_type=Path))
+@click.option("--from", "from_form", metavar="FORMAT", help="Format of A.  [default: told by what it says]")
+@click.option("--to", "to_form", metavar="FORMAT", help="Format of B.  [default: by its ending]")
+def convert(source: str, target: Path, from_form: str | None, to_form: str | None) -> None:
+    """Write the calibration file A again as B, with every digit.
+
+    Formats: subtense, opencv, opencv_xml, opencv_json, ros, kalibr, colmap, colmap_bin, mrcal, opensfm, matlab, open3d.
+    What A does not say stands behind its name: A#640x480 (picture size), A#cam1 (which camera), A#fisheye.
+    """
+    from .workflow.convert_camera import convert_camera
+
+    if lost := convert_camera(source, target, from_form=from_form, to_form=to_form):
+        click.echo(f"subtense: {_one_line(lost)}", err=True)
 
 
 @main.command(epilog="Example: subtense measure examples/desk.jpg --marker-size '50 mm' --overlay out.png")
