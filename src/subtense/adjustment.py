@@ -493,19 +493,23 @@ def _covariance(problem: Problem, state: State, chi2: float) -> tuple[Array, int
 # -- the start -----------------------------------------------------------------------------------------------------------
 
 
-def start_state(problem: Problem) -> State:
+def start_state(problem: Problem, intrinsics: Sequence[Array] | None = None) -> State:
     """Where to start: lenses without distortion and a middle in the picture's; focal lengths by the best fit of a few.
+
+    Args:
+        problem: what is to be explained.
+        intrinsics: of each camera where they are known.
 
     Raises:
         GeometryError: no start (`no_convergence`).
     """
-    found = [_start_of(problem, camera) for camera in range(len(problem.models))]
-    intrinsics = tuple(theta for theta, _ in found)
-    firsts = found[0][1]
+    thetas = intrinsics or [_start_of(problem, camera) for camera in range(len(problem.models))]
+    found = [_poses(problem, camera, theta) for camera, theta in enumerate(thetas)]
+    firsts = found[0]
     relative = []
     for camera in range(1, len(found)):
-        relative.append(_relative(firsts, found[camera][1]))
-        for frame, pose in found[camera][1].items():  # frames that the first camera did not see
+        relative.append(_relative(firsts, found[camera]))
+        for frame, pose in found[camera].items():  # frames that the first camera did not see
             if frame not in firsts:
                 firsts[frame] = _chained(relative[-1].inverse(), pose)
     missing = [f for f in range(problem.frames) if f not in firsts]
@@ -513,7 +517,7 @@ def start_state(problem: Problem) -> State:
         raise GeometryError("no start for a picture of the board", code="no_convergence")
     ordered = [firsts[f] for f in range(problem.frames)]
     boards = Pose(np.stack([p.rotation for p in ordered]), np.stack([p.translation_m for p in ordered]))
-    return State(intrinsics, tuple(relative), boards)
+    return State(tuple(thetas), tuple(relative), boards)
 
 
 def _chained(a_from_b: Pose, b_from_c: Pose) -> Pose:
@@ -533,8 +537,15 @@ def _relative(firsts: dict[int, Pose], own: dict[int, Pose]) -> Pose:
     return Pose(rotation, np.median([p.translation_m for p in each], 0))
 
 
-def _start_of(problem: Problem, camera: int) -> tuple[Array, dict[int, Pose]]:
-    """Intrinsics of one camera and its board poses, by trying focal lengths from a fisheye's to a long lens's."""
+def _poses(problem: Problem, camera: int, theta: Array) -> dict[int, Pose]:
+    """The board's place in each frame that a camera saw."""
+    sights = [s for s in problem.sights if s.camera == camera]
+    poses = {s.frame: _pose_of(problem, s, theta, problem.models[camera].lens)[0] for s in sights}
+    return {frame: pose for frame, pose in poses.items() if pose is not None}
+
+
+def _start_of(problem: Problem, camera: int) -> Array:
+    """Intrinsics of one camera, by trying focal lengths from a fisheye's to a long lens's."""
     width, height = problem.sizes_px[camera]
     model = problem.models[camera]
     sights = [s for s in problem.sights if s.camera == camera]
@@ -546,8 +557,7 @@ def _start_of(problem: Problem, camera: int) -> tuple[Array, dict[int, Pose]]:
             best = (cost, theta)
     if best is None:
         raise GeometryError("no start for the camera: the points fit no flat board", code="no_convergence")
-    poses = {s.frame: _pose_of(problem, s, best[1], model.lens)[0] for s in sights}
-    return best[1], {frame: pose for frame, pose in poses.items() if pose is not None}
+    return best[1]
 
 
 def _pose_of(problem: Problem, sight: Sight, theta: Array, lens: str) -> tuple[Pose | None, float]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .adjustment import LENS_MODELS, Adjusted, LensModel, Problem, State, adjust, inverse, reduced
-from .arrays import Array
+from .arrays import Array, Indices
 from .errors import GeometryError
 
 LEVEL = 0.002
@@ -161,7 +161,7 @@ def warp_check(solution: Adjusted) -> Check | None:
 # -- residuals ---------------------------------------------------------------------------------------------------------
 
 
-def _standardised(solution: Adjusted) -> list[tuple[Array, Array, Array]]:
+def _standardised(solution: Adjusted) -> list[tuple[Array, Indices, Array]]:
     """Per camera residuals over their noise (n, 2), the points' ids (n,), and where they were seen (n, 2)."""
     found = []
     for block, r in zip(solution.problem.blocks, solution.residuals_px, strict=True):
@@ -171,11 +171,11 @@ def _standardised(solution: Adjusted) -> list[tuple[Array, Array, Array]]:
     return found
 
 
-def _grouped(scaled: Array, group: Array, count: int) -> tuple[Array, Array]:
+def _grouped(scaled: Array, group: Indices, count: int) -> tuple[Array, Indices]:
     """Sum of squares of the groups' means over their variance, per group, and how many each has."""
     n = np.bincount(group, minlength=count)
     sums = np.column_stack([np.bincount(group, scaled[:, i], count) for i in range(2)])
-    return np.sum(sums**2, 1) / np.maximum(n, 1), n
+    return np.asarray(np.sum(sums**2, 1) / np.maximum(n, 1)), n
 
 
 def board_check(solution: Adjusted) -> Check:
@@ -228,10 +228,10 @@ def residual_check(solution: Adjusted, columns: int = 6, rows: int = 4) -> Check
                  noise_factor=float(np.sqrt(ratio)))  # fmt: skip
 
 
-def _cell(points_px: Array, width: int, height: int, columns: int, rows: int) -> Array:
+def _cell(points_px: Array, width: int, height: int, columns: int, rows: int) -> Indices:
     x = np.clip((points_px[:, 0] + 0.5) / width * columns, 0, columns - 1).astype(int)
     y = np.clip((points_px[:, 1] + 0.5) / height * rows, 0, rows - 1).astype(int)
-    return y * columns + x
+    return np.asarray(y * columns + x)
 
 
 def halves_check(solution: Adjusted) -> Check | None:

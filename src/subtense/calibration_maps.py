@@ -69,10 +69,15 @@ def _moves(camera: Camera, points_px: Array, turn: Array | None) -> tuple[Array,
     _, inner, outer = projection(camera.lens, theta, rays, range(camera.coefficients.size))
     by_turn = np.cross(rays[:, None, :], outer)
     if turn is None:
-        good = np.isfinite(inner).all((1, 2)) & np.isfinite(by_turn).all((1, 2))
-        n = inner.shape[-1]
-        turn = np.linalg.lstsq(by_turn[good].reshape(-1, 3), inner[good].reshape(-1, n), rcond=None)[0]
+        turn = _best_turn(inner, by_turn)
     return inner - by_turn @ turn, turn
+
+
+def _best_turn(inner: Array, by_turn: Array) -> Array:
+    """(3, n) the turn of the camera that undoes most of what each number moves."""
+    good = np.isfinite(inner).all((1, 2)) & np.isfinite(by_turn).all((1, 2))
+    n = inner.shape[-1]
+    return np.asarray(np.linalg.lstsq(by_turn[good].reshape(-1, 3), inner[good].reshape(-1, n), rcond=None)[0])
 
 
 def _scale_u(camera: Camera, grid: Array, turn: Array, cov: Array) -> Array:

@@ -118,7 +118,7 @@ def _of_one_size(seen: Seen) -> tuple[int, int]:
     return next(iter(sizes))
 
 
-def _check_found(seen: Seen, board: Board) -> None:
+def check_found(seen: Seen, board: Board) -> None:
     """Enough pictures show the board.
 
     Raises:
@@ -159,7 +159,7 @@ def calibrate(paths: Sequence[Path], board: Board, *, printed: Quantity | None =
     _check_model(model)
     board, notes = printed_scale(board, printed)
     seen = see(paths, board, progress, threads)
-    _check_found(seen, board)
+    check_found(seen, board)
     return calibrate_views(seen, board, model=model, square_pixels=square_pixels, notes=notes)
 
 
@@ -174,7 +174,7 @@ def calibrate_views(seen: Seen | Sequence[BoardView], board: Board, *, model: st
     _check_model(model)
     if not isinstance(seen, Seen):
         seen = Seen(tuple(seen), ("",) * len(seen), tuple(v.name for v in seen))
-    _check_found(seen, board)
+    check_found(seen, board)
     size = _of_one_size(seen)
     order = [i for i, v in enumerate(seen.views) if v is not None]
     sights = tuple(Sight(0, n, view) for n, i in enumerate(order) if (view := seen.views[i]) is not None)
@@ -389,7 +389,7 @@ def calibrate_rig_views(left: Seen, right: Seen, board: Board, *, model: str | N
                         notes: tuple[Note, ...] = ()) -> Calibration:  # fmt: skip
     """The same from points that were found before; pictures of one index were taken at once."""
     for seen in (left, right):
-        _check_found(seen, board)
+        check_found(seen, board)
     pairs = sum(a is not None and b is not None for a, b in zip(left.views, right.views, strict=True))
     if pairs < LEAST_PICTURES:
         raise NothingFoundError(f"the board is in both pictures of {pairs} pairs, {LEAST_PICTURES} are needed", found=pairs,

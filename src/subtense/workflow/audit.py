@@ -1,0 +1,173 @@
+"""Auditing a calibration that someone else made, with pictures of a board that it has not seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..adjustment import LensModel, Problem, Sight, adjust, start_state
+from ..arrays import Array
+from ..board import Board
+from ..calibration import Calibration
+from ..calibration_checks import Check
+from ..calibration_maps import uncertainty_map
+from ..camera import Camera
+from ..errors import InputError
+from ..geometry import rotation_from_vector
+from ..quantity import Note, Quantity
+from .calibrate import Progress, Seen, calibrate_views, check_found, printed_scale, see
+
+TOO_FAR = 3.0
+"""So many combined u between the stated camera and that of the pictures can't be trusted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """What pictures say of a stated camera.
+
+    Attributes:
+        camera: as stated, at the pictures' size.
+        calibration: the camera by the pictures themselves.
+        rms_px: of the pictures explained by the stated camera, with only the board's places free.
+        relative_range_error: by how much ranges by the stated camera come out too long, mean over the picture.
+        u_relative_range_error: its standard deviation, of both cameras.
+        off_px: root mean square difference of the two cameras over the picture, a turn apart.
+        expected_off_px: what their uncertainties let expect.
+        checks: the questions of the audit.
+        notes: doubts.
+    """
+
+    camera: Camera
+    calibration: Calibration
+    rms_px: float
+    relative_range_error: float
+    u_relative_range_error: float
+    off_px: float
+    expected_off_px: float
+    checks: tuple[Check, ...]
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the pictures bear the stated camera out, within its stated uncertainty."""
+        return all(c.passed for c in self.checks)
+
+
+def audit(camera: Camera, paths: Sequence[Path], board: Board, *, printed: Quantity | None = None, progress: Progress | None = None,
+          threads: int | None = None) -> Audit:  # fmt: skip
+    """Ask pictures of a board whether a stated camera is right.
+
+    Args:
+        camera: as stated, with its covariance.
+        paths: pictures by it, in the mode it is stated for.
+        board, printed, progress, threads: as in `calibrate`.
+
+    Raises:
+        InputError: pictures of other proportions than the camera's.
+        NothingFoundError: the board is in too few pictures.
+        GeometryError: the pictures leave the camera open.
+    """
+    board, _ = printed_scale(board, printed)
+    seen = see(paths, board, progress, threads)
+    check_found(seen, board)
+    return audit_views(camera, seen, board)
+
+
+def audit_views(camera: Camera, seen: Seen, board: Board) -> Audit:
+    """The same from points that were found before."""
+    own = calibrate_views(seen, board)
+    camera, notes = _at_size_of(camera, own.camera)
+    if camera.cov is None:
+        notes = (*notes, Note("calibration_without_uncertainty", "the stated camera has no covariance: it is judged as if exact",
+                              "calibrate with a tool that tells it"))  # fmt: skip
+    rms = _rms_of(camera, own)
+    x, y = np.meshgrid(np.linspace(0, camera.width_px - 1, 25), np.linspace(0, camera.height_px - 1, 19))
+    seen_px = np.concatenate([s.view.points_px for s in own.solution.problem.sights])
+    grid = np.column_stack([x.ravel(), y.ravel()])
+    grid = grid[_near(grid, seen_px)]
+    moves = difference_px(camera, own.camera, grid)
+    off = float(np.sqrt(np.nanmean(np.sum(moves**2, -1)) / 2))
+    error = _range_error(camera, own.camera, grid)
+    u_error, expected = _expected(camera, own.camera)
+    checks = (_range_verdict(error, u_error), _projection_verdict(off, expected, rms, own))
+    return Audit(camera, own, rms, error, u_error, off, expected, checks, notes)
+
+
+def _at_size_of(camera: Camera, own: Camera) -> tuple[Camera, tuple[Note, ...]]:
+    size, wanted = (camera.width_px, camera.height_px), (own.width_px, own.height_px)
+    if size == wanted:
+        return camera, ()
+    if abs(size[0] / size[1] * wanted[1] / wanted[0] - 1) > 0.005:
+        raise InputError("--check", f"for {size[0]} x {size[1]} px", f"the pictures have {wanted[0]} x {wanted[1]} px; give "
+                         "pictures in the mode it was calibrated for")  # fmt: skip
+    note = Note("calibration_size_mismatch", f"the camera is for {size[0]} x {size[1]} px; it was scaled to the pictures' "
+                f"{wanted[0]} x {wanted[1]} px", "give pictures of its own size")  # fmt: skip
+    return camera.resized(*wanted), (note,)
+
+
+def _rms_of(camera: Camera, own: Calibration) -> float:
+    """The pictures' rms by the stated camera, with only the board's places free."""
+    k = camera.coefficients
+    model = LensModel("stated", camera.lens, k.size, tuple(range(k.size)))
+    sights = tuple(Sight(0, s.frame, s.view) for s in own.solution.problem.sights)
+    problem = Problem(own.board, sights, (model,), ((camera.width_px, camera.height_px),), held=True)
+    theta = np.array([camera.f_px, camera.aspect, camera.cx_px, camera.cy_px, *k])
+    return adjust(problem, start_state(problem, [theta])).rms_px
+
+
+def _near(grid: Array, seen_px: Array) -> Array:
+    """Which places of the grid lie where the board was seen: inside the box of all points."""
+    low, high = seen_px.min(0), seen_px.max(0)
+    return np.asarray(np.all((grid >= low) & (grid <= high), axis=1))
+
+
+def difference_px(stated: Camera, other: Camera, grid: Array) -> Array:
+    """(N, 2) how far the stated camera puts the direction of a pixel of the other one from that pixel, px, the turn between the
+    two that fits best taken out."""
+    rays = other.rays(grid)
+    turn = np.zeros(3)
+    for _ in range(5):
+        turned = rays @ rotation_from_vector(turn).T
+        off = stated.project(turned) - grid
+        steps = [(stated.project(turned @ rotation_from_vector(h).T) - grid - off) / 1e-6 for h in 1e-6 * np.eye(3)]
+        jacobian = np.stack(steps, -1)
+        good = np.isfinite(off).all(1) & np.isfinite(jacobian).all((1, 2))
+        turn = turn - np.linalg.lstsq(jacobian[good].reshape(-1, 3), off[good].reshape(-1), rcond=None)[0]
+    return np.asarray(stated.project(rays @ rotation_from_vector(turn).T) - grid)
+
+
+def _range_error(stated: Camera, other: Camera, grid: Array) -> float:
+    """Mean over the grid of how much larger the stated camera sees small things: ranges by it come out longer by as much."""
+    reach = 2.0
+    ends = [
+        difference_px(stated, other, grid + np.array(step))
+        for step in ((reach, 0), (-reach, 0), (0, reach), (0, -reach))
+    ]
+    return float(np.nanmean((ends[0] - ends[1])[:, 0] + (ends[2] - ends[3])[:, 1]) / (4 * reach))
+
+
+def _expected(stated: Camera, other: Camera) -> tuple[float, float]:
+    """What both uncertainties let expect: of the range error, relative, and of the difference in px."""
+    a, b = (uncertainty_map(c, 9, 7) for c in (stated, other))
+    u_range = math.hypot(float(np.nanmedian(a.relative_u_range)), float(np.nanmedian(b.relative_u_range)))
+    return u_range, math.sqrt(float(np.nanmean(a.u_px**2)) + float(np.nanmean(b.u_px**2)))
+
+
+def _range_verdict(error: float, u: float) -> Check:
+    word = "long" if error > 0 else "short"
+    text = f"ranges by the stated camera come out {abs(error):.2%} too {word}, by these pictures (u of that {u:.2%})".replace(
+        "%", " %"
+    )
+    return Check("range", abs(error) <= TOO_FAR * u, text, "calibrate anew, or widen its covariance")
+
+
+def _projection_verdict(off: float, expected: float, rms: float, own: Calibration) -> Check:
+    text = (f"directions differ by {off:.2f} px rms over the picture, {expected:.2f} px are expected; the stated camera leaves "
+            f"{rms:.3f} px rms, the pictures' own {own.solution.rms_px:.3f} px")  # fmt: skip
+    return Check(
+        "directions", off <= TOO_FAR * expected, text, "calibrate anew: another focus, zoom, mode, or a bad calibration"
+    )
