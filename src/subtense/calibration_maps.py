@@ -52,14 +52,25 @@ def uncertainty_map(camera: Camera, columns: int = 33, rows: int = 25) -> Uncert
     x = np.linspace(0, camera.width_px - 1, columns)
     y = np.linspace(0, camera.height_px - 1, rows)
     grid = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    moves, turn = _moves(camera, grid, None)
-    cov = np.zeros((moves.shape[-1],) * 2) if camera.cov is None else camera.cov
-    each = moves @ cov @ moves.swapaxes(-1, -2)
-    good = np.isfinite(each).all((1, 2))
-    u = np.full(len(grid), np.nan)
-    u[good] = np.sqrt(np.linalg.eigvalsh(each[good])[:, -1].clip(0))
+    _, turn = _moves(camera, grid, None)
     shape = (rows, columns)
-    return UncertaintyMap(x, y, u.reshape(shape), _scale_u(camera, grid, turn, cov).reshape(shape))
+    return UncertaintyMap(
+        x, y, uncertainty_at(camera, grid).reshape(shape), _scale_u(camera, grid, turn).reshape(shape)
+    )
+
+
+def uncertainty_at(camera: Camera, points_px: Array) -> Array:
+    """(N,) standard deviation of where known directions are seen, px, along its worse axis; NaN where there is no direction."""
+    moves, _ = _moves(camera, points_px, None)
+    each = moves @ _cov(camera) @ moves.swapaxes(-1, -2)
+    good = np.isfinite(each).all((1, 2))
+    u = np.full(len(points_px), np.nan)
+    u[good] = np.sqrt(np.linalg.eigvalsh(each[good])[:, -1].clip(0))
+    return u
+
+
+def _cov(camera: Camera) -> Array:
+    return np.zeros((4 + camera.coefficients.size,) * 2) if camera.cov is None else camera.cov
 
 
 def _moves(camera: Camera, points_px: Array, turn: Array | None) -> tuple[Array, Array]:
@@ -80,14 +91,14 @@ def _best_turn(inner: Array, by_turn: Array) -> Array:
     return np.asarray(np.linalg.lstsq(by_turn[good].reshape(-1, 3), inner[good].reshape(-1, n), rcond=None)[0])
 
 
-def _scale_u(camera: Camera, grid: Array, turn: Array, cov: Array) -> Array:
+def _scale_u(camera: Camera, grid: Array, turn: Array) -> Array:
     """(N,) relative u of the size of something small seen at each point: half the divergence of the moves."""
     reach = 2.0
     ends = [
         _moves(camera, grid + np.array(step), turn)[0] for step in ((reach, 0), (-reach, 0), (0, reach), (0, -reach))
     ]
     growth = ((ends[0] - ends[1])[:, 0] + (ends[2] - ends[3])[:, 1]) / (4 * reach)
-    return np.asarray(np.sqrt(np.einsum("pi,ij,pj->p", growth, cov, growth).clip(0)))
+    return np.asarray(np.sqrt(np.einsum("pi,ij,pj->p", growth, _cov(camera), growth).clip(0)))
 
 
 # -- the next picture -----------------------------------------------------------------------------------------------------

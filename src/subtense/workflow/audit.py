@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..adjustment import LensModel, Problem, Sight, adjust, start_state
+from ..adjustment import Adjusted, LensModel, Problem, Sight, adjust, start_state
 from ..arrays import Array
 from ..board import Board
 from ..calibration import Calibration
-from ..calibration_checks import Check
-from ..calibration_maps import uncertainty_map
+from ..calibration_checks import Check, ranges_m
+from ..calibration_maps import uncertainty_at, uncertainty_map
 from ..camera import Camera
 from ..errors import InputError
 from ..geometry import rotation_from_vector
@@ -33,10 +33,10 @@ class Audit:
         camera: as stated, at the pictures' size.
         calibration: the camera by the pictures themselves.
         rms_px: of the pictures explained by the stated camera, with only the board's places free.
-        relative_range_error: by how much ranges by the stated camera come out too long, mean over the picture.
+        relative_range_error: by how much ranges by the stated camera come out too long, mean over the pictures.
         u_relative_range_error: its standard deviation, of both cameras.
-        off_px: root mean square difference of the two cameras over the picture, a turn apart.
-        expected_off_px: what their uncertainties let expect.
+        off_px: root mean square difference of the two cameras where the board was seen, a turn apart.
+        off_in_u: the same in what their uncertainties let expect.
         checks: the questions of the audit.
         notes: doubts.
     """
@@ -47,7 +47,7 @@ class Audit:
     relative_range_error: float
     u_relative_range_error: float
     off_px: float
-    expected_off_px: float
+    off_in_u: float
     checks: tuple[Check, ...]
     notes: tuple[Note, ...] = ()
 
@@ -84,17 +84,18 @@ def audit_views(camera: Camera, seen: Seen, board: Board) -> Audit:
     if camera.cov is None:
         notes = (*notes, Note("calibration_without_uncertainty", "the stated camera has no covariance: it is judged as if exact",
                               "calibrate with a tool that tells it"))  # fmt: skip
-    rms = _rms_of(camera, own)
-    x, y = np.meshgrid(np.linspace(0, camera.width_px - 1, 25), np.linspace(0, camera.height_px - 1, 19))
-    seen_px = np.concatenate([s.view.points_px for s in own.solution.problem.sights])
-    grid = np.column_stack([x.ravel(), y.ravel()])
-    grid = grid[_near(grid, seen_px)]
+    held = _explained_by(camera, own)
+    ratio = ranges_m(held) / ranges_m(own.solution)
+    u_ratio = math.hypot(*(_central_u(c) for c in (camera, own.camera)))
+    grid = _covered(own)
     moves = difference_px(camera, own.camera, grid)
-    off = float(np.sqrt(np.nanmean(np.sum(moves**2, -1)) / 2))
-    error = _range_error(camera, own.camera, grid)
-    u_error, expected = _expected(camera, own.camera)
-    checks = (_range_verdict(error, u_error), _projection_verdict(off, expected, rms, own))
-    return Audit(camera, own, rms, error, u_error, off, expected, checks, notes)
+    expected = np.hypot(uncertainty_at(camera, grid), uncertainty_at(own.camera, grid))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        in_u = float(np.sqrt(np.nanmean(np.sum(moves**2, -1) / 2 / expected**2)))
+    off = float(np.sqrt(np.nanmean(np.sum(moves**2, -1) / 2)))
+    error = float(np.mean(ratio)) - 1
+    checks = (_range_verdict(error, u_ratio), _projection_verdict(off, in_u, held.rms_px, own))
+    return Audit(camera, own, held.rms_px, error, u_ratio, off, in_u, checks, notes)
 
 
 def _at_size_of(camera: Camera, own: Camera) -> tuple[Camera, tuple[Note, ...]]:
@@ -109,20 +110,30 @@ def _at_size_of(camera: Camera, own: Camera) -> tuple[Camera, tuple[Note, ...]]:
     return camera.resized(*wanted), (note,)
 
 
-def _rms_of(camera: Camera, own: Calibration) -> float:
-    """The pictures' rms by the stated camera, with only the board's places free."""
+def _explained_by(camera: Camera, own: Calibration) -> Adjusted:
+    """The pictures explained by the stated camera, with only the board's places free."""
     k = camera.coefficients
     model = LensModel("stated", camera.lens, k.size, tuple(range(k.size)))
     sights = tuple(Sight(0, s.frame, s.view) for s in own.solution.problem.sights)
     problem = Problem(own.board, sights, (model,), ((camera.width_px, camera.height_px),), held=True)
     theta = np.array([camera.f_px, camera.aspect, camera.cx_px, camera.cy_px, *k])
-    return adjust(problem, start_state(problem, [theta])).rms_px
+    return adjust(problem, start_state(problem, [theta]))
 
 
-def _near(grid: Array, seen_px: Array) -> Array:
-    """Which places of the grid lie where the board was seen: inside the box of all points."""
-    low, high = seen_px.min(0), seen_px.max(0)
-    return np.asarray(np.all((grid >= low) & (grid <= high), axis=1))
+def _covered(own: Calibration) -> Array:
+    """(N, 2) places of a grid over the picture that lie near a point of the board in one of the pictures."""
+    camera = own.camera
+    x, y = np.meshgrid(np.linspace(0, camera.width_px - 1, 25), np.linspace(0, camera.height_px - 1, 19))
+    grid = np.column_stack([x.ravel(), y.ravel()])
+    seen_px = np.concatenate([s.view.points_px for s in own.solution.problem.sights])
+    reach = max(camera.width_px, camera.height_px) / 24
+    near = [bool((np.abs(seen_px - place).max(1) < reach).any()) for place in grid]
+    return np.asarray(grid[np.array(near)])
+
+
+def _central_u(camera: Camera) -> float:
+    """Relative u of ranges by a camera: the median over its picture."""
+    return float(np.nanmedian(uncertainty_map(camera, 9, 7).relative_u_range))
 
 
 def difference_px(stated: Camera, other: Camera, grid: Array) -> Array:
@@ -140,23 +151,6 @@ def difference_px(stated: Camera, other: Camera, grid: Array) -> Array:
     return np.asarray(stated.project(rays @ rotation_from_vector(turn).T) - grid)
 
 
-def _range_error(stated: Camera, other: Camera, grid: Array) -> float:
-    """Mean over the grid of how much larger the stated camera sees small things: ranges by it come out longer by as much."""
-    reach = 2.0
-    ends = [
-        difference_px(stated, other, grid + np.array(step))
-        for step in ((reach, 0), (-reach, 0), (0, reach), (0, -reach))
-    ]
-    return float(np.nanmean((ends[0] - ends[1])[:, 0] + (ends[2] - ends[3])[:, 1]) / (4 * reach))
-
-
-def _expected(stated: Camera, other: Camera) -> tuple[float, float]:
-    """What both uncertainties let expect: of the range error, relative, and of the difference in px."""
-    a, b = (uncertainty_map(c, 9, 7) for c in (stated, other))
-    u_range = math.hypot(float(np.nanmedian(a.relative_u_range)), float(np.nanmedian(b.relative_u_range)))
-    return u_range, math.sqrt(float(np.nanmean(a.u_px**2)) + float(np.nanmean(b.u_px**2)))
-
-
 def _range_verdict(error: float, u: float) -> Check:
     word = "long" if error > 0 else "short"
     text = f"ranges by the stated camera come out {abs(error):.2%} too {word}, by these pictures (u of that {u:.2%})".replace(
@@ -165,9 +159,7 @@ def _range_verdict(error: float, u: float) -> Check:
     return Check("range", abs(error) <= TOO_FAR * u, text, "calibrate anew, or widen its covariance")
 
 
-def _projection_verdict(off: float, expected: float, rms: float, own: Calibration) -> Check:
-    text = (f"directions differ by {off:.2f} px rms over the picture, {expected:.2f} px are expected; the stated camera leaves "
-            f"{rms:.3f} px rms, the pictures' own {own.solution.rms_px:.3f} px")  # fmt: skip
-    return Check(
-        "directions", off <= TOO_FAR * expected, text, "calibrate anew: another focus, zoom, mode, or a bad calibration"
-    )
+def _projection_verdict(off: float, in_u: float, rms: float, own: Calibration) -> Check:
+    text = (f"directions differ by {off:.2f} px rms where the board was seen, {in_u:.1f} times what both uncertainties let expect; "
+            f"the stated camera leaves {rms:.3f} px rms, the pictures' own {own.solution.rms_px:.3f} px")  # fmt: skip
+    return Check("directions", in_u <= TOO_FAR, text, "calibrate anew: another focus, zoom, mode, or a bad calibration")
