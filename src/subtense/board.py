@@ -87,6 +87,17 @@ class Board:
         return np.column_stack([x, y, np.zeros_like(x)]) * self.square_m
 
     @property
+    def width_m(self) -> float:
+        """Between the outer edges of the whole pattern, across: what `--printed` measures on the print.
+
+        Squares: of all columns. Circles: from the first column's centres to the last one's. AprilGrid: from the first tag's left
+        side to the last one's right side.
+        """
+        if self.kind == "circles":
+            return float(np.ptp(self.points_m[:, 0]))
+        return (self.columns - 1) * self.square_m + self.marker_m if self.kind == "aprilgrid" else self.columns * self.square_m
+
+    @property
     def text(self) -> str:
         """As people say it: "chessboard of 10 x 7 squares of 25 mm"."""
         many = {"circles": "circles", "aprilgrid": "tags"}.get(self.kind, "squares")
