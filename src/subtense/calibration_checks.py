@@ -51,6 +51,7 @@ class Check:
         extra_cov: what it adds to the covariance of all global unknowns; None for nothing.
         noise_factor: by how much the noise seems larger than the residuals say, as far as the camera goes.
         better: a solution that the check found better; None for none.
+        gain: by how much it lowers the sum of squares, in variances of the noise; with 2 degrees of freedom.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Check:
     extra_cov: Array | None = field(default=None, compare=False, repr=False)
     noise_factor: float = 1.0
     better: Adjusted | None = field(default=None, compare=False, repr=False)
+    gain: float = 0.0
 
 
 def widened(solution: Adjusted, checks: Sequence[Check]) -> Adjusted:
@@ -68,8 +70,13 @@ def widened(solution: Adjusted, checks: Sequence[Check]) -> Adjusted:
 
     Common directions of residuals and halves that disagree are two views of noise that is not independent: the larger counts.
     """
-    best = next((c.better for c in checks if c.better is not None), solution)
-    cov = best.cov * max(c.noise_factor for c in checks) ** 2
+    from scipy.stats import chi2
+
+    noise = max(c.noise_factor for c in checks)
+    # a bow that is no more than such noise would make is doubt, not knowledge: the value then stays as it is
+    sure = [c.better for c in checks if c.better is not None and chi2.sf(c.gain / noise**2, 2) < LEVEL]
+    best = sure[0] if sure else solution
+    cov = best.cov * noise**2
     return replace(best, cov=cov + sum((c.extra_cov for c in checks if c.extra_cov is not None), np.zeros_like(cov)))
 
 
@@ -155,7 +162,8 @@ def warp_check(solution: Adjusted) -> Check | None:
             f"moves the focal length by {shift[0]:+.2f} px")  # fmt: skip
     # the true shape is between flat and beyond the fitted one by a part: the shift stands for limits
     return Check("board flatness", False, text, "fix the board to a plate of glass or aluminium",
-                 extra_cov=np.outer(shift, shift) / 3, better=bowed)  # fmt: skip
+                 extra_cov=np.outer(shift, shift) / 3, better=bowed,
+                 gain=(solution.chi2 - bowed.chi2) / bowed.factor**2)  # fmt: skip
 
 
 # -- residuals ---------------------------------------------------------------------------------------------------------

@@ -60,10 +60,13 @@ def printed_scale(board: Board, printed: Quantity | None) -> tuple[Board, tuple[
         printed: length between the outer edges of the pattern across, as measured on the print; None if nobody did.
     """
     if printed is None:
+        if board.relative_u > 0 and not board.source.startswith("assumed"):
+            return board, ()
+        relative_u = board.relative_u or ASSUMED_SCALE
         note = Note("print_scale_assumed", f"lengths rest on the stated square of {board.square_m * 1000:.6g} mm, taken to "
-                    f"{ASSUMED_SCALE:.1%}: pictures can't show the scale of a print; focal lengths don't depend on it".replace("%", " %"),
+                    f"{relative_u:.1%}: pictures can't show the scale of a print; focal lengths don't depend on it".replace("%", " %"),
                     "measure the whole width of the pattern and give it with --printed")  # fmt: skip
-        return replace(board, relative_u=ASSUMED_SCALE, source="assumed: 0.5 %"), (note,)
+        return replace(board, relative_u=relative_u, source=f"assumed: {relative_u:.1%}".replace("%", " %")), (note,)
     ratio = float(printed.value) / board.width_m
     if not 0.5 < ratio < 2:
         raise InputError("--printed", f"{float(printed.value) * 1000:g} mm", "give the measured width of the whole pattern, "
