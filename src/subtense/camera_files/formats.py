@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -100,6 +101,10 @@ _OF_ENDING = {".json": "subtense", ".xml": "opencv_xml", ".yml": "opencv", ".yam
 """What is written where only an ending is given."""
 
 
+_JSON = re.compile(r'[\[]|\{\s*["}]|\{\s*$')
+"""How JSON begins; YAML's brackets have keys without double quotes."""
+
+
 # -- reading -------------------------------------------------------------------------------------------
 
 
@@ -153,7 +158,7 @@ def _syntax(path: object, content: bytes) -> str:
         return "xml"
     if mrcal.marked(text[:4096]):
         return "literal"
-    if bare[:1] in ("{", "["):
+    if _JSON.match(bare):
         return "json"
     if colmap.tells_text(text):
         return "text"

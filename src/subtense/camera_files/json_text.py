@@ -35,11 +35,11 @@ def tree(path: object, text: str) -> Any:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        keys = [key for key, _ in pairs]
-        key = next(key for key in found if keys.count(key) > 1)
-        raise _RefusedError(f"has the key {key[:40]!r} twice; keep the right one")
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise _RefusedError(f"has the key {key[:40]!r} twice; keep the right one")
+        found[key] = value
     return found
 
 

@@ -23,7 +23,10 @@ _OF_THE_CHOICE = "camera_source"
 
 def tells(tree: Any) -> bool:
     """Whether this is one."""
-    return isinstance(tree, dict) and (isinstance(tree.get("camera"), dict) or "f_px" in tree)
+    if not isinstance(tree, dict):
+        return False
+    inner = tree.get("camera")
+    return "f_px" in tree or (isinstance(inner, dict) and "projection_type" not in inner)  # that is a camera of OpenSfM
 
 
 def read(reading: Reading) -> Found:

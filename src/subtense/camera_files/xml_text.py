@@ -33,6 +33,8 @@ def tree(path: object, content: bytes) -> Any:
         parser.Parse(content, True)
     except expat.ExpatError as error:
         raise FileFormatError(path, f"is not XML: {error}") from None
+    except FileFormatError:
+        raise
     except (ValueError, LookupError):
         raise FileFormatError(path, "is not XML: its encoding is unknown; save it as UTF-8") from None
     return elements.root
