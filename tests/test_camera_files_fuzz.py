@@ -46,12 +46,12 @@ FILES = [
 def answered(content, name="a.yml", form=None):
     """A camera, or an error of ours on one line; within a second."""
     path, pick = selector.split(name, there=False)
-    start = time.process_time()
+    start, found, said = time.process_time(), None, ""
     try:
         found = formats.read(path, content, pick, form)
     except SubtenseError as error:
-        assert "\n" not in str(error) and len(str(error)) < 600, error
-        found = None
+        said = str(error)
+    assert "\n" not in said and len(said) < 600
     assert time.process_time() - start < 2
     if found is not None:
         assert (
@@ -110,11 +110,14 @@ def test_any_number_in_the_place_of_any(form, value, place):
 
 
 LONG = 2**20 - 100
+OPENINGS = [
+    "[", "{a: ", "- ", "(", '"', "'", '"\\"', "a: ", "a:\n ", "<a>", "#", "a ", "a: - ", "a: [", "a: '", 'a: "\\"', "a: |\n ", "a: b\n c",
+    " : ", "x: [1, ", "\n", "a: {b: ", "- a: ", '{"a": ', "'a': ", "1 A 1 1 ", "?", "!!", "a: x #'", "!a ",
+    "{'lens_model': 'LENSMODEL_PINHOLE', ",
+]  # fmt: skip
 
 
-@pytest.mark.parametrize("opening", ["[", "{a: ", "- ", "(", '"', "'", '"\\"', "a: ", "a:\n ", "<a>", "#", "a ", "a: - ", "a: [", "a: '", 'a: "\\"',
-                                     "a: |\n ", "a: b\n c", " : ", "x: [1, ", "\n", "a: {b: ", "- a: ", '{"a": ', "'a': ", "1 A 1 1 ", "?", "!!",
-                                     "a: x #'", "!a ", "{'lens_model': 'LENSMODEL_PINHOLE', "])  # fmt: skip
+@pytest.mark.parametrize("opening", OPENINGS)
 @pytest.mark.parametrize(
     "before", ["", "<opencv_storage>", "{'lens_model': 'LENSMODEL_PINHOLE', 'a': ", "a: ", "%YAML:1.0\n---\nk: "]
 )
@@ -125,4 +128,4 @@ def test_a_mebibyte_of_one_thing(before, opening):
 
 def test_many_keys_are_no_trouble():
     answered("\n".join(f"k{i}: {i}" for i in range(80_000)).encode())
-    answered(("{" + ",".join(f'"k{i}":{i}' for i in range(70_000)) + ', "k1": 1}').encode(), "a.json")
+    answered(("{" + ",".join(f'"k{i}":{i}' for i in range(70_000)) + ', "k69999": 1}').encode(), "a.json")
