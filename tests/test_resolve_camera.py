@@ -9,7 +9,7 @@ from PIL.TiffImagePlugin import IFDRational
 from subtense.camera import Camera
 from subtense.errors import FileFormatError, InputError, UnknownCameraError
 from subtense.photo import Photo
-from subtense.workflow.resolve_camera import resolve_camera
+from subtense.workflow.resolve_camera import CAMERA_SOURCES, resolve_camera
 
 FOCAL, F35, FP_X, FP_UNIT, WIDTH, HEIGHT, ZOOM, TURN = 0x920A, 0xA405, 0xA20E, 0xA210, 0xA002, 0xA003, 0xA404, 0x0112
 
@@ -110,7 +110,8 @@ def test_a_wide_picture_from_another_sensor_is_widened(take):
 def test_nothing_known_is_an_error_that_says_what_to_give(take):
     with pytest.raises(UnknownCameraError, match=r"--camera: a calibration file, f=1500px") as caught:
         resolve_camera(take())
-    assert {source for source, _ in caught.value.tried} == {"exif_focal_plane", "exif_35mm"}
+    assert {source for source, _ in caught.value.tried} == set(CAMERA_SOURCES)
+    assert caught.value.code == "no_focal_length"
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,11 @@ whole), both are corrected exactly; where it tells that something was cut off an
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 
 from .edited import is_applied, is_film_frame
+from .lens_class import is_phone
 from .metadata import Metadata, number
 from .photo import Photo
 from .quantity import Note
@@ -43,6 +45,8 @@ USUAL_ASPECTS = (
 )
 """Long side over short of what cameras make; another one was cut."""
 ASPECT_TOLERANCE = 0.012
+LENS_TOLERANCE = 0.06
+"""Logarithm of focal length over that in the lens's name, within which both are of one lens: names are rounded."""
 
 Pair = tuple[float, float]
 
@@ -76,7 +80,7 @@ def tagged_size(photo: Photo) -> TaggedSize:
     """Compare the stored size with the tags; swapped tags are read the other way round."""
     now = photo.stored_size_px
     found = TaggedSize(whole_px=(float(now[0]), float(now[1])), middle_px=((now[0] - 1) / 2, (now[1] - 1) / 2))
-    for look in (_zoomed, _cut, _film):
+    for look in (_zoomed, _cut, _film, _lens):
         found = look(photo, found)
     return found
 
@@ -105,6 +109,23 @@ def _film(photo: Photo, found: TaggedSize) -> TaggedSize:
             "than a still, which is in u")  # fmt: skip
     u = (high - low) / math.sqrt(12) / middle
     return _noted(replace(found, film=middle), "video_crop", text, "calibrate the camera in this film mode", u)
+
+
+_MILLIMETRES = re.compile(r"(\d+(?:\.\d+)?)\s?mm")
+
+
+def _lens(photo: Photo, found: TaggedSize) -> TaggedSize:
+    """A phone has several lenses: which one it was, lens model and focal length must tell alike."""
+    tags = photo.metadata
+    if not is_phone(tags) or not tags.focal_mm:
+        return found
+    named = [float(text) for text in _MILLIMETRES.findall(tags.lens or "")] or list(tags.lens_focal_mm or ())
+    gaps = [abs(math.log(one / tags.focal_mm)) for one in named if one > 0]
+    if not gaps or min(gaps) < LENS_TOLERANCE:
+        return found
+    text = (f"the lens is called {tags.lens!r}, and the focal length is {tags.focal_mm:g} mm: the tags are of two lenses of "
+            "this phone")  # fmt: skip
+    return _noted(found, "lens_ambiguous", text, "give the camera with --camera", min(min(gaps), 1.0))
 
 
 # -- resized and cropped -----------------------------------------------------------------------------------

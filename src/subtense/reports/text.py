@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from textwrap import wrap
+from typing import Any
 
 from ..document import Document
 from ..quantity import Measurement, Note
@@ -48,10 +50,37 @@ def report(document: Document) -> str:
 def _camera(document: Document) -> Iterator[str]:
     camera = document.camera or {}
     yield f"camera: {_focal(camera['f_px'], camera.get('u_f_px'))}, {camera['source']}"
-    for other in camera.get("hypotheses", ()):
-        if not other["chosen"]:
-            said = _focal(other["f_px"], other["u_f_px"]) + ", " if other["f_px"] else "nothing: "
-            yield f"  {other['source']} says {said}{other['text']}"
+    if any(m.what == "focal_length_px" for m in document.measurements):  # the camera is what was asked for
+        yield from _sources(camera)
+    else:
+        for other in camera.get("hypotheses", ()):
+            if not other["chosen"] and other["f_px"]:
+                yield f"  {other['source']} says {_focal(other['f_px'], other['u_f_px'])}, {other['text']}"
+    if camera.get("pose"):
+        yield _pose(camera["pose"])
+
+
+def _sources(camera: Mapping[str, Any]) -> Iterator[str]:
+    """A table of what every source says, the chosen one marked, and where the rest of the camera comes from."""
+    for name, source in camera.get("part_sources", {}).items():
+        yield f"  {name}: {source}"
+    told = camera.get("hypotheses", ())
+    said = [
+        _focal(h["f_px"], h["u_f_px"]).removeprefix("f = ").removesuffix(" (95 %)") if h["f_px"] else "-" for h in told
+    ]
+    widest = max((len(h["source"]) for h in told), default=0)
+    broadest = max((len(text) for text in said), default=0)
+    yield "what every source says (95 %)"
+    for h, text in zip(told, said, strict=True):
+        yield f"{'>' if h['chosen'] else ' '} {h['source']:<{widest}}  {text:<{broadest}}  {h['text']}"
+
+
+def _pose(pose: Mapping[str, Any]) -> str:
+    """One line: the angles of the upright picture, and the height where it is told."""
+    pitch, roll, half = (math.degrees(pose[key]) for key in ("pitch_rad", "roll_rad", "u_rad"))
+    height = pose["height_above_start_m"]
+    above = f", {height:.1f} m ± {1.96 * pose['u_height_m']:.1f} m above the start" if height is not None else ""
+    return f"pose: pitch {pitch:+.1f}° (0 the horizon, -90 straight down), roll {roll:+.1f}°, both ± {1.96 * half:.1f}° (95 %){above}, {pose['source']}"
 
 
 def _focal(f_px: float, u: float | None) -> str:

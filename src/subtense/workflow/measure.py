@@ -117,7 +117,7 @@ def measure_inputs(
 
 def no_camera_document(photo: Photo, why: UnknownCameraError) -> Document:
     """A photo whose camera nothing tells, which is no failure of the one who asks: a document with a note."""
-    return Document((), None, photo.to_json(), (*photo.notes, Note("unknown_camera", str(why))))
+    return Document((), None, photo.to_json(), (*photo.notes, Note(why.code, str(why))))
 
 
 def camera_document(photo: Photo, given_camera: str | Resolved | None = None, *, level: float = 0.95) -> Document:

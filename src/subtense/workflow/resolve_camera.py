@@ -12,13 +12,30 @@ import numpy as np
 from ..camera import Camera
 from ..camera_files import selector
 from ..camera_files.formats import ENDINGS
-from ..camera_sources import calibration_file, exif_35mm, exif_focal_plane, typed
+from ..camera_sources import (
+    calibration_file,
+    dji_tags,
+    exif_35mm,
+    exif_focal_plane,
+    google_tags,
+    heic_matrix,
+    panorama_tags,
+    pix4d_tags,
+    typed,
+)
+from ..edited import refusal
 from ..errors import InputError, UnknownCameraError
 from ..hypothesis import Hypothesis
 from ..photo import Photo
 from ..quantity import Note
+from ..told_pose import ToldPose, told_pose
 
 CAMERA_SOURCES: dict[str, Callable[[Photo], Hypothesis]] = {
+    panorama_tags.NAME: panorama_tags.camera,
+    dji_tags.NAME: dji_tags.camera,
+    pix4d_tags.NAME: pix4d_tags.camera,
+    heic_matrix.NAME: heic_matrix.camera,
+    google_tags.NAME: google_tags.camera,
     exif_focal_plane.NAME: exif_focal_plane.camera,
     exif_35mm.NAME: exif_35mm.camera,
 }
@@ -51,12 +68,14 @@ class Resolved:
         chosen: the hypothesis it comes from.
         hypotheses: all, the chosen one among them.
         notes: doubts about the camera.
+        pose: how the camera stood, where the file tells it.
     """
 
     camera: Camera
     chosen: Hypothesis
     hypotheses: tuple[Hypothesis, ...]
     notes: tuple[Note, ...]
+    pose: ToldPose | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The camera with its u and what the other sources said."""
@@ -65,7 +84,8 @@ class Resolved:
              "u_f_px": h.camera.u_f_px if h.camera else None, "text": h.reason, "chosen": h is self.chosen}
             for h in self.hypotheses
         ]  # fmt: skip
-        return {**self.camera.to_json(), "u_f_px": self.camera.u_f_px, "hypotheses": said}
+        pose = {"pose": self.pose.to_json()} if self.pose else {}
+        return {**self.camera.to_json(), "u_f_px": self.camera.u_f_px, "hypotheses": said, **pose}
 
 
 def resolve_camera(photo: Photo, given: str | SentFile | None = None, *, paths: bool = True) -> Resolved:
@@ -80,20 +100,67 @@ def resolve_camera(photo: Photo, given: str | SentFile | None = None, *, paths: 
         UnknownCameraError: no source has a camera; it lists why, and what to give.
         InputError, FileFormatError: `given` can't be used.
     """
-    hypotheses = [source(photo) for source in CAMERA_SOURCES.values()]
+    hypotheses = _settled(_without_pinholes(photo, [source(photo) for source in CAMERA_SOURCES.values()]))
     if given is not None:
-        chosen = _given(given, photo, paths=paths)
+        chosen = _without_pinholes(photo, [_given(given, photo, paths=paths)])[0]
         hypotheses.insert(0, chosen)
     else:
         chosen = min(hypotheses, key=lambda h: h.relative_u)
     if chosen.camera is None:
-        tried = tuple((h.source, h.reason) for h in hypotheses)
-        why = "; ".join(reason for _, reason in tried)
-        raise UnknownCameraError(f"{photo.name}: no camera ({why}); {WHAT_TO_GIVE}", tried)
+        raise _unknown(photo, hypotheses)
     camera, disagreement = _compared(chosen, hypotheses, widen=given is None)
     refused = tuple(n for h in hypotheses if h.camera is None for n in h.notes)
     notes = dict.fromkeys((*photo.notes, *chosen.notes, *(() if given else refused), *disagreement))
-    return Resolved(camera, chosen, tuple(hypotheses), tuple(notes))
+    return Resolved(camera, chosen, tuple(hypotheses), tuple(notes), told_pose(photo))
+
+
+def _unknown(photo: Photo, hypotheses: list[Hypothesis]) -> UnknownCameraError:
+    """No camera: each source and why, and what to give."""
+    tried = tuple((h.source, h.reason) for h in hypotheses)
+    tags, note = photo.metadata, refusal(photo)
+    if note is not None:
+        return UnknownCameraError(f"{photo.name}: {note.text}; {note.cure}", tried, code=note.code)
+    why = "; ".join(dict.fromkeys(reason for _, reason in tried))
+    code = "unknown_camera" if tags.focal_mm or tags.f35_mm else "no_focal_length"
+    return UnknownCameraError(f"{photo.name}: no camera ({why}); {WHAT_TO_GIVE}", tried, code=code)
+
+
+def _without_pinholes(photo: Photo, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+    """A panorama and an edited perspective are no pinhole's picture, whatever the tags say: only a panorama's lens may stay."""
+    note = refusal(photo)
+    if note is None:
+        return hypotheses
+    kept = []
+    for one in hypotheses:
+        panorama = note.code == "panorama" and one.camera is not None and one.camera.lens == "equirectangular"
+        reason = one.reason if one.camera is None else f"{note.code}: no pinhole took this picture"
+        kept.append(one if panorama else Hypothesis(one.source, None, reason))
+    return kept
+
+
+def _settled(hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+    """Where tags have two readings and the other sources fit one of them only, that one is taken."""
+    return [_read(one, [h for h in hypotheses if h is not one and h.camera and not h.either]) for one in hypotheses]
+
+
+def _read(one: Hypothesis, others: list[Hypothesis]) -> Hypothesis:
+    if not one.either or not others:
+        return one
+    fitting = [
+        camera for camera in one.either
+        if all(_gap(camera, other.camera) <= AGREE_WITHIN for other in others if other.camera is not None)
+    ]  # fmt: skip
+    if len(fitting) != 1:
+        return one
+    return replace(
+        one, camera=fitting[0], reason=f"{one.reason} (of two readings the one that fits the other sources)", either=()
+    )
+
+
+def _gap(a: Camera, b: Camera) -> float:
+    """How many combined u the focal lengths of two cameras differ by."""
+    fa, fb = float(a.f_px), float(b.f_px)
+    return abs(math.log(fa / fb)) / max(math.hypot(a.u_f_px / fa, b.u_f_px / fb), 1e-12)
 
 
 def _given(text: str | SentFile, photo: Photo, *, paths: bool) -> Hypothesis:
