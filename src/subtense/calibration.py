@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -102,6 +103,49 @@ class Calibration:
         what = {"rig": self.rig.to_json()} if self.rig else {"camera": self.camera.to_json(), "frame": "stored"}
         return {"schema": "subtense-calibration/1", "version": __version__, **what,
                 "notes": [n.to_json() for n in self.notes], "calibration": told}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Audit:
+    """What pictures say of a stated camera.
+
+    Attributes:
+        camera: as stated, at the pictures' size.
+        calibration: the camera by the pictures themselves.
+        rms_px: of the pictures explained by the stated camera, with only the board's places free.
+        relative_range_error: by how much ranges by the stated camera come out too long, mean over the pictures.
+        u_relative_range_error: its standard deviation, of both cameras.
+        off_px: root mean square difference of the two cameras where the board was seen, a turn apart.
+        off_in_u: the same in what their uncertainties let expect.
+        checks: the questions of the audit.
+        notes: doubts.
+    """
+
+    camera: Camera
+    calibration: Calibration
+    rms_px: float
+    relative_range_error: float
+    u_relative_range_error: float
+    off_px: float
+    off_in_u: float
+    checks: tuple[Check, ...]
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the pictures bear the stated camera out, within its stated uncertainty."""
+        return all(c.passed for c in self.checks)
+
+    def to_json(self) -> dict[str, Any]:
+        """The verdict, what it rests on, both cameras."""
+        return {
+            "schema": "subtense-audit/1", "trusted": self.trusted, "camera": self.camera.to_json(),
+            "rms_px": self.rms_px, "relative_range_error": self.relative_range_error,
+            "u_relative_range_error": self.u_relative_range_error, "off_px": self.off_px,
+            "off_in_u": self.off_in_u if math.isfinite(self.off_in_u) else None,
+            "checks": [{"name": c.name, "passed": c.passed, "found": c.found, "cure": c.cure} for c in self.checks],
+            "notes": [n.to_json() for n in self.notes], "pictures": self.calibration.to_json(),
+        }  # fmt: skip
 
 
 def doubts(checks: tuple[Check, ...]) -> tuple[Note, ...]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,12 @@ from . import __version__
 from .errors import InputError, SubtenseError
 
 if TYPE_CHECKING:
+    from .board import Board
+    from .calibration import Calibration
     from .document import Document
     from .method import Method
     from .photo import Photo
+    from .quantity import Quantity
 
 
 class _Group(click.Group):
@@ -287,6 +291,125 @@ def _method_command(found: Method) -> click.Command:
     params = [*options, inputs, *reversed(run.__click_params__)]  # type: ignore[attr-defined]
     text = f"{found.title[0].upper()}{found.title[1:]}.\n\n{found.needs}"
     return click.Command(found.name, params=params, callback=run, help=text)
+
+
+@main.command(
+    epilog="Example: subtense calibrate shots/*.jpg --board charuco --squares 8x6 --square '25 mm' --marker '18 mm' "
+    "--dictionary 4x4_50 -o camera.json"
+)
+@click.argument("images", nargs=-1, type=click.Path(path_type=Path), metavar="IMAGES...")
+@click.option(
+    "--board",
+    "kind",
+    default="charuco",
+    show_default=True,
+    metavar="KIND",
+    help="chessboard, charuco, circles or aprilgrid.",
+)
+@click.option("--squares", metavar="COLUMNSxROWS", help="How many squares (circles, tags) across and down, as 10x7.")
+@click.option("--square", metavar="LENGTH", help="Side of a square, mm if bare.")
+@click.option("--marker", metavar="LENGTH", help="Side of a marker's black square, mm if bare.")
+@click.option("--dictionary", metavar="NAME", help="Of the markers, as 4x4_50 or 36h11.")
+@click.option("--legacy", is_flag=True, help="A ChArUco pattern of OpenCV before 4.6.")
+@click.option("--printed", metavar="LENGTH", help="The pattern's whole width as measured on the print, mm if bare.")
+@click.option(
+    "--model",
+    metavar="NAME",
+    help="Lens model: pinhole, k1, k1k2, opencv4, opencv5, opencv8, opencv12, fisheye.  "
+    "[default: what foretells unseen pictures best]",
+)
+@click.option("--square-pixels", is_flag=True, help="Hold the pixels square.")
+@click.option("--stereo", is_flag=True, help="Two cameras: two folders, or all left IMAGES and then all right ones.")
+@click.option(
+    "--check", metavar="FILE", help="Audit this calibration by IMAGES instead; exit code 3 if it can't be trusted."
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Write the camera: .json, or .yaml, .xml, .txt of other tools.",
+)
+@click.option("--report", type=click.Path(path_type=Path), help="Write a report: .html with pictures, .txt or .json.")
+@click.option(
+    "--plots", type=click.Path(path_type=Path), help="Write the pictures of the report as PNG into this folder."
+)
+@click.option("--format", "form", type=click.Choice(["text", "json"]), default="text", show_default=True)
+def calibrate(images: tuple[Path, ...], kind: str, squares: str | None, square: str | None, marker: str | None, dictionary: str | None,
+              legacy: bool, printed: str | None, model: str | None, square_pixels: bool, stereo: bool, check: str | None,
+              output: Path | None, report: Path | None, plots: Path | None, form: str) -> None:  # fmt: skip
+    """Calibrate a camera from IMAGES of a board (files or folders): intrinsics with their uncertainty, and how far to trust them.
+
+    About 20 pictures at one focus and zoom: the board tilted by 30 to 45 degrees to each side, near and far, all over the picture.
+    """
+    from .workflow import calibrate as way
+    from .workflow.calibrate_input import board_of, pairs_of, pictures_of, printed_width
+    from .workflow.calibration_output import check_report
+
+    board = board_of(kind, squares, square, marker, dictionary, legacy=legacy)
+    width = printed_width(printed)
+    if report is not None:
+        check_report(report)
+    if check is not None:
+        _audit(check, pictures_of(images), board, width, form)
+        return
+    if stereo:
+        left, right = pairs_of(images)
+        with _progress(len(left) + len(right)) as told:
+            found = way.calibrate_rig(
+                left, right, board, printed=width, model=model, square_pixels=square_pixels, progress=told
+            )
+    else:
+        pictures = pictures_of(images)
+        with _progress(len(pictures)) as told:
+            found = way.calibrate(
+                pictures, board, printed=width, model=model, square_pixels=square_pixels, progress=told
+            )
+    _show_calibration(found, form, output, report, plots)
+
+
+@contextmanager
+def _progress(pictures: int) -> Iterator[Callable[[int, int], None]]:
+    """A bar on the terminal's error stream, told (done, of how many); nothing where that is no terminal."""
+    with click.progressbar(
+        length=pictures, label="Finding the board", file=sys.stderr, hidden=not sys.stderr.isatty()
+    ) as bar:
+        yield lambda done, _: bar.update(done - bar.pos)
+
+
+def _show_calibration(
+    found: Calibration, form: str, output: Path | None, report: Path | None, plots: Path | None
+) -> None:
+    import json
+
+    from .reports.calibration_text import text
+    from .workflow.calibration_output import camera_file, report_file
+
+    if output is not None and (lost := camera_file(found, output)):
+        click.echo(f"subtense: {lost}", err=True)
+    if report is not None:
+        report_file(found, report)
+    if plots is not None:
+        from .reports.calibration_plots import png_files
+
+        png_files(found, plots)
+    click.echo(json.dumps(found.to_json(), allow_nan=False) if form == "json" else text(found))
+
+
+def _audit(check: str, pictures: list[Path], board: Board, width: Quantity | None, form: str) -> None:
+    import json
+
+    from .camera_files import selector
+    from .camera_sources import calibration_file
+    from .reports.audit_text import text
+    from .workflow.audit import audit
+
+    path, pick = selector.split(check)
+    stated = calibration_file.read(path, pick).camera
+    with _progress(len(pictures)) as told:
+        found = audit(stated, pictures, board, printed=width, progress=told)
+    click.echo(json.dumps(found.to_json(), allow_nan=False) if form == "json" else text(found))
+    if not found.trusted:
+        sys.exit(3)
 
 
 @main.command()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from ..adjustment import Adjusted, LensModel, Problem, Sight, adjust, start_state
 from ..arrays import Array
 from ..board import Board
-from ..calibration import Calibration
+from ..calibration import Audit, Calibration
 from ..calibration_checks import Check, ranges_m
 from ..calibration_maps import uncertainty_at, uncertainty_map
 from ..camera import Camera
@@ -23,38 +22,6 @@ from .calibrate import Progress, Seen, calibrate_views, check_found, printed_sca
 
 TOO_FAR = 3.0
 """So many combined u between the stated camera and that of the pictures can't be trusted."""
-
-
-@dataclass(frozen=True, eq=False)
-class Audit:
-    """What pictures say of a stated camera.
-
-    Attributes:
-        camera: as stated, at the pictures' size.
-        calibration: the camera by the pictures themselves.
-        rms_px: of the pictures explained by the stated camera, with only the board's places free.
-        relative_range_error: by how much ranges by the stated camera come out too long, mean over the pictures.
-        u_relative_range_error: its standard deviation, of both cameras.
-        off_px: root mean square difference of the two cameras where the board was seen, a turn apart.
-        off_in_u: the same in what their uncertainties let expect.
-        checks: the questions of the audit.
-        notes: doubts.
-    """
-
-    camera: Camera
-    calibration: Calibration
-    rms_px: float
-    relative_range_error: float
-    u_relative_range_error: float
-    off_px: float
-    off_in_u: float
-    checks: tuple[Check, ...]
-    notes: tuple[Note, ...] = ()
-
-    @property
-    def trusted(self) -> bool:
-        """Whether the pictures bear the stated camera out, within its stated uncertainty."""
-        return all(c.passed for c in self.checks)
 
 
 def audit(camera: Camera, paths: Sequence[Path], board: Board, *, printed: Quantity | None = None, progress: Progress | None = None,
