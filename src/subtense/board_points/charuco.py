@@ -17,12 +17,14 @@ from ..board import Board
 from ..errors import InputError
 from .dictionaries import NAMES, dictionary, dictionary_name, size_of
 from .gray import Reduced, reduced, steps
-from .lattice import FEWEST, fit, fit_without_strays, scatter_px
-from .saddles import ASSUMED_PX, FLOOR_PX, refined, windows_px
-from .seen import Missing, Seen
+from .lattice import FEWEST, fit
+from .saddles import refined, windows_px
+from .seen import Missing, Seen, fitted, grid_of
 
 MANY = 0.75
 """Share of the corners in the reduced picture that makes a search of the full one needless."""
+LEAST_FREE = 0.1
+"""Reach of a window in squares where the markers leave less."""
 BIGGEST = (
     "4x4_1000",
     "5x5_1000",
@@ -89,25 +91,14 @@ def _detected(gray: Pixels, board: Board) -> tuple[Array, Indices, Indices]:
 def _fitted(gray: Pixels, board: Board, corners: Array, ids: Indices) -> Seen | None:
     """The corners refined, without strays; None where they are too few to be believed."""
     height, width = gray.shape
-    grid = board.points_m[:, :2] / board.square_m
-    if len(ids) < FEWEST:
+    rough = fitted(board, ids, corners, (width, height), "charuco")
+    if rough is None:
         return None
-    rough, keep = fit_without_strays(grid[ids], corners, width, height)
-    if rough is None or keep.sum() < FEWEST:
-        return None
-    ids, corners = ids[keep], corners[keep]
-    free = max((1 - board.marker_m / board.square_m) / 2, 0.1)
-    exact = refined(gray, corners, windows_px(rough, grid[ids], free))
-    ids, exact = ids[np.isfinite(exact).all(axis=1)], exact[np.isfinite(exact).all(axis=1)]
-    lattice, keep = fit_without_strays(grid[ids], exact, width, height)
-    if lattice is None or keep.sum() < FEWEST:
-        return None
-    ids, exact = ids[keep], exact[keep]
-    order = np.argsort(ids)
-    ids, exact = ids[order], exact[order]
-    sigma = scatter_px(lattice, ids, exact, board.points_across, board.points_down)
-    sigma = max(sigma, FLOOR_PX) if len(ids) >= 2 * FEWEST else max(sigma, ASSUMED_PX)
-    return Seen(ids, exact, np.full(len(ids), sigma if np.isfinite(sigma) else ASSUMED_PX), "charuco")
+    lattice, seen = rough
+    free = max((1 - board.marker_m / board.square_m) / 2, LEAST_FREE)
+    exact = refined(gray, seen.points_px, windows_px(lattice, grid_of(board)[seen.ids], free))
+    again = fitted(board, seen.ids, exact, (width, height), "charuco")
+    return None if again is None else again[1]
 
 
 # -- what is there instead -------------------------------------------------------------------------------
@@ -139,9 +130,8 @@ def _instead(gray: Pixels, board: Board, markers: int) -> Missing:
 
 
 def _is_board(small: Reduced, board: Board, corners: Array, ids: Indices) -> bool:
-    grid = board.points_m[:, :2] / board.square_m
     height, width = small.pixels.shape
-    lattice = fit(grid[ids], corners, width, height) if len(ids) >= 2 * FEWEST else None
+    lattice = fit(grid_of(board)[ids], corners, width, height) if len(ids) >= 2 * FEWEST else None
     return lattice is not None and lattice.rms_px < 1.0
 
 

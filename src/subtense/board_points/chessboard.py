@@ -17,18 +17,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..arrays import Array, Pixels
+from ..arrays import Array, Bools, Pixels
 from ..board import Board
 from .gray import Reduced, reduced, steps
-from .lattice import Lattice, fit, fit_without_strays, scatter_px
-from .saddles import ASSUMED_PX, FLOOR_PX, refined, windows_px
-from .seen import Missing, Seen
+from .lattice import Lattice, fit
+from .saddles import refined, windows_px
+from .seen import Missing, Seen, fitted
 
 CLASSICAL, SECTORS = "chessboard, classical", "chessboard, sectors"
 ALTERNATES = 0.4
 """Contrast of a row's squares over that of the row before it, from which it belongs to the board."""
-FREE = 0.4
-"""How far from a corner the window reaches, in squares: the outer squares of many boards are cut to half."""
+FREE, FREE_AT_CUT = 0.7, 0.4
+"""How far from a corner its window reaches, in squares; the second beside outer squares that are cut to half, as on many boards."""
+CUT = 0.8
+"""Where an outer square is looked at to see whether it is whole, in squares from its inner side."""
 NEAR = 0.3
 """Where a row's squares are looked at, in squares from their side that is nearer to the middle."""
 MOST_BEYOND = 3
@@ -89,23 +91,20 @@ def _judged(gray: Pixels, board: Board, corners: Array, source: str, exact: bool
     columns, rows = extent(gray, lattice, board.points_across, board.points_down)
     if (columns, rows) != (board.columns, board.rows):
         return Missing(len(corners))
-    again = _fitted(board, refined(gray, corners, windows_px(lattice, grid, FREE)), source, width, height)
-    own = _fitted(board, corners, f"{source}, its own corners", width, height) if exact else None
-    found = [seen for seen in (again, own) if seen is not None]
-    return min(found, key=lambda seen: seen[0]) if found else Missing(len(corners))
+    windows = np.where(_beside_cut(gray, lattice, board), *(windows_px(lattice, grid, f) for f in (FREE_AT_CUT, FREE)))
+    views = [_fitted(board, refined(gray, corners, windows), source, (width, height))]
+    if exact:
+        views.append(_fitted(board, corners, f"{source}, its own corners", (width, height)))
+    found = [view for view in views if view is not None]
+    return min(found, key=lambda view: view[0]) if found else Missing(len(corners))
 
 
-def _fitted(board: Board, corners: Array, source: str, width_px: int, height_px: int) -> tuple[float, Seen] | None:
-    """Rms residual and what is seen, without strays; None where too much of the board is missing."""
-    ids = np.flatnonzero(np.isfinite(corners).all(axis=1))
-    grid = _grid(board.points_across, board.points_down)[ids]
-    lattice, keep = fit_without_strays(grid, corners[ids], width_px, height_px)
-    if lattice is None or keep.sum() < LEAST_SHARE * len(corners):
+def _fitted(board: Board, corners: Array, source: str, size_px: tuple[int, int]) -> tuple[float, Seen] | None:
+    """Rms residual and what is seen; None where too much of the board is missing."""
+    found = fitted(board, np.arange(len(corners)), corners, size_px, source)
+    if found is None or len(found[1].ids) < LEAST_SHARE * len(corners):
         return None
-    ids = ids[keep]
-    sigma = scatter_px(lattice, ids, corners[ids], board.points_across, board.points_down)
-    sigma = max(sigma, FLOOR_PX) if np.isfinite(sigma) else ASSUMED_PX
-    return lattice.rms_px, Seen(ids, corners[ids], np.full(len(ids), sigma), source)
+    return found[0].rms_px, found[1]
 
 
 # -- order and count -------------------------------------------------------------------------------------
@@ -164,32 +163,46 @@ def extent(gray: Pixels, lattice: Lattice, across: int, down: int) -> tuple[int,
 
 def _run(gray: Pixels, lattice: Lattice, across: int, down: int, *, upright: bool = False) -> int:
     """Columns of alternating squares from the middle one to either side; rows if `upright`."""
-    sign = np.where(np.arange(-1, down) % 2 == 0, 1.0, -1.0)
-
-    def contrast(column: int) -> float:
-        """Light of every second square less that of the others, NaN outside the picture."""
-        x = column + 0.5 if 0 <= column < across - 1 else column + 1 - NEAR if column < 0 else column + NEAR
-        y = np.clip(np.arange(-1, down) + 0.5, -NEAR, down - 1 + NEAR)
-        spots = np.stack(np.broadcast_arrays(x, y), axis=-1)
-        spots = spots[:, None] + _AROUND
-        light = _light(gray, lattice.project(spots[..., ::-1] if upright else spots))
-        seen, s = np.isfinite(light), sign * (1 if column % 2 == 0 else -1)
-        if min((seen & (s > 0)).sum(), (seen & (s < 0)).sum()) < 1 or seen.sum() < 3:
-            return np.nan
-        return float(light[seen & (s > 0)].mean() - light[seen & (s < 0)].mean())
-
     middle = (across - 1) // 2
-    found, start = 1, contrast(middle)
+    found, start = 1, _contrast(gray, lattice, across, down, middle, upright=upright)
     for step in (-1, 1):
         column, last = middle + step, start
         while -MOST_BEYOND <= column < across + MOST_BEYOND:
-            now = contrast(column)
+            now = _contrast(gray, lattice, across, down, column, upright=upright)
             if np.isnan(now):
                 now = last if -1 <= column < across else 0.0
             if not now / last > ALTERNATES:
                 break
             found, column, last = found + 1, column + step, now
     return found
+
+
+def _contrast(
+    gray: Pixels, lattice: Lattice, across: int, down: int, column: int, *, near: float = NEAR, upright: bool = False
+) -> float:
+    """Light of every second square of a column (a row if `upright`) less that of the others, NaN outside the picture."""
+    x = column + 0.5 if 0 <= column < across - 1 else column + 1 - near if column < 0 else column + near
+    y = np.clip(np.arange(-1, down) + 0.5, -NEAR, down - 1 + NEAR)
+    spots = np.stack(np.broadcast_arrays(x, y), axis=-1)[:, None] + _AROUND
+    light = _light(gray, lattice.project(spots[..., ::-1] if upright else spots))
+    sign = np.where((np.arange(-1, down) + column) % 2 == 0, 1.0, -1.0)
+    seen = np.isfinite(light)
+    if min((seen & (sign > 0)).sum(), (seen & (sign < 0)).sum()) < 1 or seen.sum() < 3:
+        return np.nan
+    return float(light[seen & (sign > 0)].mean() - light[seen & (sign < 0)].mean())
+
+
+def _beside_cut(gray: Pixels, lattice: Lattice, board: Board) -> Bools:
+    """(N,) which corners lie beside outer squares that end early."""
+    out = np.zeros((board.points_down, board.points_across), bool)
+    for upright, across, down in ((False, *out.shape[::-1]), (True, *out.shape)):
+        for column in (-1, across - 1):
+            inner, outer = (
+                _contrast(gray, lattice, across, down, column, near=n, upright=upright) for n in (NEAR, CUT)
+            )
+            edge = (out.T if upright else out)[:, 0 if column < 0 else -1]
+            edge |= not outer / inner > ALTERNATES
+    return out.ravel()
 
 
 _AROUND = np.stack(np.meshgrid([-0.15, 0.0, 0.15], [-0.15, 0.0, 0.15]), axis=-1).reshape(-1, 2)

@@ -19,10 +19,6 @@ from .lattice import Lattice
 
 SMALLEST_PX, LARGEST_PX = 2, 25
 """Least and greatest half side of a window."""
-FLOOR_PX = 0.02
-"""No corner is better known: pixels sample, pictures are compressed."""
-ASSUMED_PX = 0.1
-"""Where there are too few points to tell."""
 
 
 def windows_px(lattice: Lattice, board: Array, free: float) -> Indices:

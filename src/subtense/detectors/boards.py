@@ -7,7 +7,7 @@ points of the view tell against each other; the board's flatness and print are n
 from __future__ import annotations
 
 from ..board import Board, BoardView
-from ..board_points import charuco, chessboard, gray
+from ..board_points import aprilgrid, charuco, chessboard, circles, gray
 from ..board_points.seen import Missing, Seen
 from ..errors import InputError, NothingFoundError
 from ..photo import Photo
@@ -72,4 +72,4 @@ def find_board(photo: Photo, board: Board) -> Seen | Missing:
         return chessboard.chessboard(picture, board)
     if board.kind == "charuco":
         return charuco.charuco(picture, board)
-    raise InputError("--board", board.kind, "chessboard and charuco are found")
+    return (circles.circles if board.kind == "circles" else aprilgrid.aprilgrid)(picture, board)
