@@ -217,6 +217,47 @@ def test_numbers_of_a_file_come_out_as_they_went_in():
     assert text in formats.write(read(text, "cameras.txt"), "colmap").decode()
 
 
+@pytest.mark.parametrize("form", ["opencv", "ros", "kalibr", "colmap", "matlab", "mrcal"])
+def test_a_person_s_numbers_stay_a_person_s(form):
+    dice = np.random.default_rng(5)
+    for fx, fy, cx, cy in np.round(dice.uniform([500, 500, 200, 200], [2000, 2000, 400, 300], (100, 4)), 2).tolist():
+        if form == "kalibr":
+            text = f"cam0:\n  camera_model: pinhole\n  intrinsics: [{fx}, {fy}, {cx}, {cy}]\n  resolution: [640, 480]\n"
+        else:
+            text = f"K: [{fx}, 0, {cx}, 0, {fy}, {cy}, 0, 0, 1]\n" + SIZE
+        there = formats.write(read(text), form)
+        assert repr(fx) in there.decode() and repr(fy) in there.decode()
+        again = formats.write(formats.read("a" + formats.FORMATS[form].endings[0], there), "kalibr").decode()
+        assert f"intrinsics: [{fx!r}, {fy!r}, " in again
+
+
+OURS = {"width_px": 640, "height_px": 480, "f_px": 900, "cx_px": 320, "cy_px": 240}
+
+
+@pytest.mark.parametrize(
+    ("change", "wrong"),
+    [
+        ({"f_px": 10**400}, "f_px is a huge number; a finite number is needed"),
+        ({"f_px": True}, "f_px is missing or no number"),
+        ({"f_px": [900, 901]}, "f_px is missing or no number"),
+        ({"width_px": 0}, "the picture's width is 0"),
+        ({"width_px": 10**9}, "a whole number of 1 to 1000000 is needed"),
+        ({"aspect": [1, 2]}, "aspect is a list"),
+        ({"lens": "thin"}, "lens is 'thin'; known are pinhole"),
+        ({"lens": ["pinhole"]}, "values of the wrong kind"),
+        ({"part_sources": [1]}, "values of the wrong kind"),
+        ({"lens": "fisheye", "distortion": [1, 2]}, r"distortion is \[1.0, 2.0\]; fisheye takes 4 numbers"),
+        ({"distortion": ["a"]}, r"distortion\[0\] is 'a'"),
+        ({"cov": [[1, 2], [3, 4]]}, "cov is .of shape"),
+        ({"cov": [[1], [3, 4]]}, "values of the wrong kind"),
+        ({"frame": "turned"}, 'frame must be "stored" or "upright"'),
+    ],
+)
+def test_our_own_refusals(change, wrong):
+    with pytest.raises(FileFormatError, match=wrong):
+        read(json.dumps({**OURS, **change}), "c.json")
+
+
 def test_ours_keeps_covariance_notes_and_frame():
     camera = replace(perspective(K5), cov=np.diag([1.2, 0.1, 0.8, 0.8, 0.002, 0.01, 0.0001, 0.0001, 0.0]) ** 2)
     found = Found(camera, (Note("model_error", "misfits at the edges", "another lens model"),), "stored")
