@@ -57,7 +57,7 @@ def _camera(document: Document) -> Iterator[str]:
             if not other["chosen"] and other["f_px"]:
                 yield f"  {other['source']} says {_focal(other['f_px'], other['u_f_px'])}, {other['text']}"
     if camera.get("pose"):
-        yield _pose(camera["pose"])
+        yield from wrap(_pose(camera["pose"]), WIDTH, subsequent_indent="  ")
 
 
 def _sources(camera: Mapping[str, Any]) -> Iterator[str]:
@@ -80,7 +80,10 @@ def _pose(pose: Mapping[str, Any]) -> str:
     pitch, roll, half = (math.degrees(pose[key]) for key in ("pitch_rad", "roll_rad", "u_rad"))
     height = pose["height_above_start_m"]
     above = f", {height:.1f} m ± {1.96 * pose['u_height_m']:.1f} m above the start" if height is not None else ""
-    return f"pose: pitch {pitch:+.1f}° (0 the horizon, -90 straight down), roll {roll:+.1f}°, both ± {1.96 * half:.1f}° (95 %){above}, {pose['source']}"
+    angles = (
+        f"pitch {pitch:+.1f}° (0 the horizon, -90 straight down), roll {roll:+.1f}°, both ± {1.96 * half:.1f}° (95 %)"
+    )
+    return f"pose: {angles}{above}, {pose['source']}"
 
 
 def _focal(f_px: float, u: float | None) -> str:

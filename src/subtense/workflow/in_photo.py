@@ -18,6 +18,7 @@ from ..arrays import Array
 from ..camera import Camera
 from ..document import Document, Shape
 from ..errors import InputError, SubtenseError, UnknownCameraError
+from ..hypothesis import ASSUMED_DISTORTION
 from ..method import Method
 from ..observation import Observation
 from ..photo import Photo
@@ -64,7 +65,8 @@ def measure_item(
     """
     inputs = item_inputs(item, photo, camera)
     found = propagate.measure(item.method, inputs, level=level, seed=seed, label=item.label, given=given(inputs))
-    headed = [found[0], *(dataclasses.replace(m, notes=()) for m in found[1:])]
+    doubts = (*found[0].notes, *_distortion_unknown(inputs))
+    headed = [dataclasses.replace(found[0], notes=doubts), *(dataclasses.replace(m, notes=()) for m in found[1:])]
     return _document(photo, camera, _camera_of(inputs), headed, _shapes(item, inputs))
 
 
@@ -157,6 +159,28 @@ def _check_inside(photo: Photo, inputs: Any) -> None:
             raise InputError(
                 field.name, ends, f"the picture has {photo.width_px} x {photo.height_px} px; all points must lie in it"
             )
+
+
+FAR_OUT = 0.5
+"""Of the half diagonal: points farther out are noted where nothing is known of the lens's distortion."""
+
+
+def _distortion_unknown(inputs: Any) -> tuple[Note, ...]:
+    """The note `distortion_unknown` for points far from the middle; what it may do is in u by the camera's covariance."""
+    camera = _camera_of(inputs)
+    if camera is None or not camera.part_sources.get("lens distortion", "").startswith(ASSUMED_DISTORTION):
+        return ()
+    half = math.hypot(camera.width_px, camera.height_px) / 2
+    middle = np.array([float(camera.cx_px), float(camera.cy_px)])
+    seen = [getattr(inputs, f.name) for f in dataclasses.fields(inputs)]
+    points = [one.points_px.reshape(-1, 2) for one in seen if isinstance(one, Observation)]
+    farthest = max((float(np.max(np.hypot(*(p - middle).T), initial=0.0)) for p in points), default=0.0) / half
+    if farthest <= FAR_OUT or camera.cov is None:
+        return ()
+    effect = 3 * math.sqrt(camera.cov[4, 4]) * (farthest * half / float(camera.f_px)) ** 2
+    text = (f"a point lies {100 * farthest:.0f} % of the way to the corner, and nothing is known of the lens's distortion; up to "
+            f"{100 * effect:.2g} % (1s) of a length there is in u")  # fmt: skip
+    return (Note("distortion_unknown", text, "calibrate the camera, or measure near the middle of the picture"),)
 
 
 def _camera_of(inputs: Any) -> Camera | None:
