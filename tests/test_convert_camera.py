@@ -46,7 +46,7 @@ def test_what_is_lost_is_said_in_one_line(run):
     assert found.exit_code == 0
     assert (
         found.stderr
-        == "subtense: c.yml: OpenCV YAML does not keep the uncertainty (covariance), the notes model_error\n"
+        == "note: c.yml: OpenCV YAML does not keep the uncertainty (covariance), the notes model_error\n"
     )
 
 

@@ -150,13 +150,28 @@ def camera() -> None:
 @click.argument("photo", type=click.Path(path_type=Path))
 @click.option("--camera", metavar="CAMERA", help="What is known of it; see `subtense measure --help`.")
 @click.option("--format", "form", default="text", show_default=True, help="text, json or csv.")
-def camera_of(photo: Path, camera: str | None, form: str) -> None:
+@click.option("--private", is_flag=True, help="Print position, altitude above the sea and serial numbers instead.")
+def camera_of(photo: Path, camera: str | None, form: str, private: bool) -> None:
     """Which camera took PHOTO, by every source: what was chosen, why, and what the others say."""
+    if private:
+        _show_private(photo)
+        return
     from .photo import Photo
     from .workflow.measure import camera_document
 
     picture = Photo.load(photo)
     _show(camera_document(picture, camera), form, photo=picture)
+
+
+def _show_private(photo: Path) -> None:
+    """What no report has: it is read and printed here only."""
+    from .private_tags import private_tags
+
+    found = private_tags(photo)
+    click.echo(
+        "\n".join(f"{what}: {value}" for what, value in found.items())
+        or "the file tells no position and no serial number"
+    )
 
 
 @camera.command(epilog="Example: subtense camera convert calib.yml#640x480 cameras.txt")
@@ -173,7 +188,7 @@ def convert(source: str, target: Path, from_form: str | None, to_form: str | Non
     from .workflow.convert_camera import convert_camera
 
     if lost := convert_camera(source, target, from_form=from_form, to_form=to_form):
-        click.echo(f"subtense: {_one_line(lost)}", err=True)
+        click.echo(f"note: {_one_line(lost)}", err=True)
 
 
 @main.command(epilog="Example: subtense measure examples/desk.jpg --marker-size '50 mm' --overlay out.png")
