@@ -78,12 +78,14 @@ class Beside:
         preview_px: width and height of the preview within.
         densities: pixels along a length in x and y, the unit of both the same.
         intrinsic_matrix: 3 x 3 row by row, px, from a HEIC.
+        exif: bytes with a TIFF header, and where it begins, for who is asked for what is not kept.
     """
 
     xmp: bytes | None = None
     preview_px: tuple[int, int] | None = None
     densities: tuple[float, float] | None = None
     intrinsic_matrix: tuple[float, ...] | None = None
+    exif: tuple[bytes, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -271,7 +273,7 @@ def _open_other(data: bytes, label: object) -> Opened:
         return Decoded(*_size_px(picture), orientation, lambda top, bottom: _strip(picture, top, bottom))
 
     form = "JPEG" if picture.format == "MPO" else str(picture.format)  # an MPO is a JPEG with others behind it
-    return Opened(form, *_size_px(picture), lambda: _exif_tags(picture), lambda: _beside(picture), decode)
+    return Opened(form, *_size_px(picture), lambda: _exif_tags(picture), lambda: _beside(picture, data), decode)
 
 
 def _exif_tags(picture: Any) -> dict[int, Any] | None:
@@ -289,15 +291,15 @@ def _exif_tags(picture: Any) -> dict[int, Any] | None:
 _EXTENDED_XMP = b"http://ns.adobe.com/xmp/extension/\0"
 
 
-def _beside(picture: Any) -> Beside:
+def _beside(picture: Any, data: bytes) -> Beside:
     info = picture.info
     packet = info.get("xmp")
     packet = packet.encode("utf-8", "replace") if isinstance(packet, str) else packet
-    exif = info.get("exif") or b""
-    preview = preview_size(exif, 6 if exif.startswith(b"Exif\0\0") else 0) if isinstance(exif, bytes) else None
+    exif = data if picture.format == "TIFF" else info.get("exif") or b""
+    block = (exif, 6 if exif.startswith(b"Exif\0\0") else 0) if isinstance(exif, bytes) and exif else None
     densities = info.get("jfif_density") or info.get("aspect") or info.get("dpi")
-    return Beside(packet if isinstance(packet, bytes) else _extended_xmp(picture), preview,
-                  tuple(densities) if densities and len(densities) == 2 else None)  # fmt: skip
+    return Beside(packet if isinstance(packet, bytes) else _extended_xmp(picture), preview_size(*block) if block else None,
+                  tuple(densities) if densities and len(densities) == 2 else None, exif=block)  # fmt: skip
 
 
 def _extended_xmp(picture: Any) -> bytes | None:
@@ -377,6 +379,7 @@ def _open_heic(data: bytes, label: object) -> Opened:
         return Beside(
             found if isinstance(found, bytes) else None,
             intrinsic_matrix=_matrix(picture.info.get("camera_intrinsic_matrix")),
+            exif=(exif, 6 if exif.startswith(b"Exif\0\0") else 0) if exif else None,
         )
 
     return Opened("HEIC", *_size_px(picture), tags, beside, decode)
@@ -429,7 +432,9 @@ def _open_raw(data: bytes, label: object) -> Opened:
         return Decoded(array.shape[1], array.shape[0], 1, lambda top, bottom: array[top:bottom])
 
     # the limit on size is one on the whole sensor, which is what takes memory
-    return Opened("RAW", sizes.raw_width, sizes.raw_height, tags, lambda: Beside(xmp_packet(data)), decode)
+    return Opened(
+        "RAW", sizes.raw_width, sizes.raw_height, tags, lambda: Beside(xmp_packet(data), exif=(data, 0)), decode
+    )
 
 
 def _dotted(version: tuple[int, ...]) -> str:

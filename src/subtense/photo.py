@@ -97,7 +97,7 @@ class Photo:
         path = Path(path)
         shown = _shown(name) or path.name
         label: object = path if name is None else shown
-        data = _bytes(path, label)
+        data = file_bytes(path, label)
         opened = open_picture(data, label, Path(name or path).suffix)
         _check_size(label, opened.width_px, opened.height_px, most_pixels)
         metadata, notes = _metadata(opened)
@@ -121,7 +121,8 @@ def _check_size(label: object, width_px: int, height_px: int, most_pixels: int) 
                               f"{most_pixels // 10**6} million, so resize it")  # fmt: skip
 
 
-def _bytes(path: Path, label: object) -> bytes:
+def file_bytes(path: Path, label: object) -> bytes:
+    """The content of a picture's file, within the limit; `label` is what it is called in errors."""
     if not path.exists():
         raise FileFormatError(label, "no such file")
     if path.is_dir():

@@ -81,6 +81,30 @@ def xmp_packet(data: bytes) -> bytes | None:
     return found if isinstance(found, bytes) else None
 
 
+_GPS_DIRECTORY = 0x8825
+_POSITION = set(range(1, 7))
+_SERIALS = {0xA431, 0xA435, 0xC62F}
+
+
+def private_tags(data: bytes, start: int = 0) -> dict[int, Any]:
+    """Tags of the GPS directory, and serial numbers: what nobody reads who is not asked to.
+
+    Args:
+        data: the file or the block.
+        start: where the TIFF header begins.
+    """
+    order = _ORDERS.get(data[start : start + 2])
+    if order is None or len(data) < start + 8:
+        return {}
+    offset = struct.unpack_from(order + "L", data, start + 4)[0]
+    first = _directory(data, start, offset, order, {_GPS_DIRECTORY, _EXIF_DIRECTORY, *_SERIALS})
+    found = {tag: value for tag, value in first.items() if tag in _SERIALS}
+    for pointer, wanted in ((_EXIF_DIRECTORY, _SERIALS), (_GPS_DIRECTORY, _POSITION)):
+        if isinstance(first.get(pointer), int):
+            found |= _directory(data, start, first[pointer], order, wanted)
+    return found
+
+
 def preview_size(exif: bytes, start: int = 0) -> tuple[int, int] | None:
     """Width and height of the preview that an EXIF block holds in its second directory; None where there is none."""
     order = _ORDERS.get(exif[start : start + 2])

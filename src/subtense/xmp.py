@@ -43,7 +43,8 @@ _MODEL = (
     "FocalLengthX FocalLengthY ImageWidth ImageHeight PrincipalPointX PrincipalPointY Skew PixelAspectRatio Distortion "
     "DistortionCount"
 )
-WANTED: Mapping[str, tuple[str, frozenset[str]]] = {
+Wanted = Mapping[str, tuple[str, frozenset[str]]]
+WANTED: Wanted = {
     uri: (prefix, frozenset(names.split()))
     for uri, prefix, names in (
         ("http://ns.adobe.com/camera-raw-settings/1.0", "crs", _CRS),
@@ -69,13 +70,18 @@ _ITEM = "{http://www.w3.org/1999/02/22-rdf-syntax-ns#}li"
 
 
 def camera_properties(packet: bytes) -> dict[str, str] | None:
-    """The wanted properties by their usual prefixed names; None where the packet is no XML, has a DTD, or is too long."""
+    """What tells of the camera, by the usual prefixed names; None where the packet is no XML, has a DTD, or is too long."""
+    return properties(packet, WANTED)
+
+
+def properties(packet: bytes, wanted: Wanted) -> dict[str, str] | None:
+    """The wanted properties of a packet; None as above."""
     from defusedxml.common import DefusedXmlException
     from defusedxml.ElementTree import DefusedXMLParser, ParseError
 
     if len(packet) > MOST_BYTES:
         return None
-    kept = _Kept()
+    kept = _Kept(wanted)
     parser = DefusedXMLParser(target=kept, forbid_dtd=True)
     try:
         # some writers end a packet with zeros or pad it in front
@@ -93,7 +99,8 @@ class _TooDeepError(Exception):
 class _Kept:
     """The target of the parser: keeps what is wanted, and no tree."""
 
-    def __init__(self) -> None:
+    def __init__(self, wanted: Wanted) -> None:
+        self._wanted = wanted
         self.found: dict[str, str] = {}
         self._open: list[str | None] = []
         self._text: list[str] = []
@@ -102,12 +109,12 @@ class _Kept:
     def start(self, tag: str, attributes: Mapping[str, str]) -> None:
         if len(self._open) >= MOST_DEPTH:
             raise _TooDeepError
-        self._open.append(_name(tag))
+        self._open.append(self._name(tag))
         self._text = []
         if self._open[-1]:
             self._items = []
         for key, value in attributes.items():
-            self._keep(_name(key), value)
+            self._keep(self._name(key), value)
 
     def data(self, text: str) -> None:
         self._text.append(text)
@@ -129,11 +136,10 @@ class _Kept:
         if name and shown:
             self.found.setdefault(name, shown)
 
-
-def _name(tag: Any) -> str | None:
-    """The usual prefixed name of a wanted property; None for any other."""
-    if not isinstance(tag, str) or not tag.startswith("{"):
-        return None
-    uri, _, local = tag[1:].partition("}")
-    prefix, names = WANTED.get(uri.rstrip("/"), ("", frozenset()))
-    return f"{prefix}:{local}" if local in names else None
+    def _name(self, tag: Any) -> str | None:
+        """The usual prefixed name of a wanted property; None for any other."""
+        if not isinstance(tag, str) or not tag.startswith("{"):
+            return None
+        uri, _, local = tag[1:].partition("}")
+        prefix, names = self._wanted.get(uri.rstrip("/"), ("", frozenset()))
+        return f"{prefix}:{local}" if local in names else None
