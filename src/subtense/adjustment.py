@@ -223,7 +223,8 @@ class Adjusted:
 
 
 def _plane(lens: str, points: Array, k: Array) -> tuple[Array, Array]:
-    return LENSES[lens].to_plane(points[..., 0], points[..., 1], points[..., 2], list(k))
+    """Normalised coordinates by the smooth formula: where a lens folds is asked when the solution stands."""
+    return (LENSES[lens].formula or LENSES[lens].to_plane)(points[..., 0], points[..., 1], points[..., 2], list(k))
 
 
 def project(lens: str, intrinsics: Array, points_m: Array) -> Array:
@@ -310,6 +311,26 @@ def linearised(problem: Problem, state: State, camera: int, ids: Indices) -> tup
     return pixels, by_global, by_board
 
 
+RATIONAL = (5, 6, 7)
+"""The coefficients of the denominator of a rational lens model."""
+RATIONAL_U = 0.5
+"""A weak prior on them, as the size of each term in the picture's corner: numerator and denominator can cancel, and then
+pictures alone leave them open."""
+
+
+def _precision(problem: Problem, state: State) -> tuple[Array, Array]:
+    """(globals,) what is known beforehand of each unknown, as 1 / u^2, and its value less what is expected: rational terms only."""
+    known, off = np.zeros(problem.size), np.zeros(problem.size)
+    at = 0
+    for model, theta, size in zip(problem.models, state.intrinsics, problem.sizes_px, strict=True):
+        corner2 = (size[0] ** 2 + size[1] ** 2) / 4 / theta[0] ** 2
+        for power, k in enumerate(RATIONAL, 1):
+            if k in model.free and model.lens == "brown_conrady":
+                known[at + 4 + k], off[at + 4 + k] = (corner2**power / RATIONAL_U) ** 2, theta[4 + k]
+        at += 4 + model.count
+    return known, off
+
+
 # -- the normal equations ------------------------------------------------------------------------------------------------
 
 
@@ -342,7 +363,8 @@ def _normal(problem: Problem, state: State) -> _Normal:
         v += jb.swapaxes(1, 2) @ jb
         g_global += flat.T @ r.reshape(-1)
         g_board += (jb.swapaxes(1, 2) @ r)[..., 0]
-    return _Normal(u, w, v, g_global, g_board)
+    known, off = _precision(problem, state)
+    return _Normal(u + np.diag(known[free]), w, v, g_global + (known * off)[free], g_board)
 
 
 def _step(normal: _Normal, damping: float) -> tuple[Array, Array]:
@@ -432,7 +454,19 @@ def _cost(problem: Problem, state: State) -> float:
     for block, r in zip(problem.blocks, residuals(problem, state), strict=True):
         present = block.weight > 0
         total += float(np.sum((r[present] * block.weight[present][:, None]) ** 2))
-    return total if np.isfinite(total) else np.inf
+    known, off = _precision(problem, state)
+    total += float(known @ off**2)
+    return total if np.isfinite(total) and not _has_pole(problem, state) else np.inf
+
+
+def _has_pole(problem: Problem, state: State) -> bool:
+    """Whether the denominator of a rational lens comes near 0 in the picture: the numerator would have to cancel it."""
+    for model, theta, size in zip(problem.models, state.intrinsics, problem.sizes_px, strict=True):
+        if model.lens == "brown_conrady" and model.count >= 8:
+            r2 = np.linspace(0, 1.5, 16) * (size[0] ** 2 + size[1] ** 2) / 4 / theta[0] ** 2
+            if np.min(1 + r2 * (theta[9] + r2 * (theta[10] + r2 * theta[11]))) < 0.2:
+                return True
+    return False
 
 
 def adjust(problem: Problem, start: State, iterations: int = 60) -> Adjusted:
@@ -451,6 +485,7 @@ def adjust(problem: Problem, start: State, iterations: int = 60) -> Adjusted:
         cost = new
         if done or not moved:
             break
+    _check_folds(problem, state)
     cov, dof = _covariance(problem, state, cost)
     return Adjusted(problem, state, cov, _kept(problem, state), cost, dof)
 
@@ -470,6 +505,16 @@ def _descend(
             return trial, new, max(damping / 10, 1e-12), True
         damping *= 10
     return state, cost, damping, False
+
+
+def _check_folds(problem: Problem, state: State) -> None:
+    """Refuse a lens whose image folds over within what was seen: it has no way back from pixels to directions."""
+    for camera, block in enumerate(problem.blocks):
+        points = _placed(problem, state, camera, block.ids)[1][block.weight > 0]
+        lens, k = problem.models[camera].lens, state.intrinsics[camera][4:]
+        if not np.all(np.isfinite(LENSES[lens].to_plane(points[:, 0], points[:, 1], points[:, 2], list(k))[0])):
+            raise GeometryError(f"the lens model {problem.models[camera].name} folds over in the picture; give another --model",
+                                code="lens_folds")  # fmt: skip
 
 
 def _kept(problem: Problem, state: State) -> tuple[Array, ...]:

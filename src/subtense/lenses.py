@@ -31,6 +31,8 @@ class Lens:
         to_plane: directions to normalised image coordinates; NaN behind the camera.
         to_ray: normalised image coordinates to directions, not of unit length; NaN where there is none.
         perspective: whether straight lines stay straight but for distortion, as the pinhole methods need.
+        formula: `to_plane` without the refusal where the image folds over: smooth, for who estimates coefficients; None where
+            nothing folds.
     """
 
     title: str
@@ -38,6 +40,7 @@ class Lens:
     to_plane: Callable[[Array, Array, Array, Coefficients], Pair]
     to_ray: Callable[[Array, Array, Coefficients], Triple]
     perspective: bool = True
+    formula: Callable[[Array, Array, Array, Coefficients], Pair] | None = None
 
 
 # -- pinhole ---------------------------------------------------------------------------------------
@@ -112,6 +115,12 @@ def _through(homography: Array, x: Array, y: Array) -> Pair:
     return (h[..., 0, 0] * x + h[..., 0, 1] * y + h[..., 0, 2]) / w, (
         h[..., 1, 0] * x + h[..., 1, 1] * y + h[..., 1, 2]
     ) / w
+
+
+def _brown_formula(x: Array, y: Array, z: Array, k: Coefficients) -> Pair:
+    x, y = _in_front(x, y, z)
+    xd, yd = _distorted(x, y, k)[:2]
+    return _through(_tilt(k), xd, yd) if len(k) >= 14 else (xd, yd)
 
 
 def _brown_to_plane(x: Array, y: Array, z: Array, k: Coefficients) -> Pair:
@@ -210,13 +219,18 @@ def _fisheye_radius(angle: Array, k: Coefficients) -> Pair:
     return radius, 1 + t * (3 * k[0] + t * (5 * k[1] + t * (7 * k[2] + t * 9 * k[3])))
 
 
-def _fisheye_to_plane(x: Array, y: Array, z: Array, k: Coefficients) -> Pair:
+def _fisheye_formula(x: Array, y: Array, z: Array, k: Coefficients) -> Pair:
     across = np.hypot(x, y)
     radius, _ = _fisheye_radius(np.arctan2(across, z), k)
     with np.errstate(divide="ignore", invalid="ignore"):
         scale = np.where(across > 0, radius / across, 0.0)
-    folded = np.arctan2(across, z) > _fisheye_turning_angle(k)
-    return np.where(folded, np.nan, x * scale), np.where(folded, np.nan, y * scale)
+    return x * scale, y * scale
+
+
+def _fisheye_to_plane(x: Array, y: Array, z: Array, k: Coefficients) -> Pair:
+    xd, yd = _fisheye_formula(x, y, z, k)
+    folded = np.arctan2(np.hypot(x, y), z) > _fisheye_turning_angle(k)
+    return np.where(folded, np.nan, xd), np.where(folded, np.nan, yd)
 
 
 def _fisheye_turning_angle(k: Coefficients) -> Array:
@@ -258,8 +272,10 @@ def _panorama_to_ray(x: Array, y: Array, _: Coefficients) -> Triple:
 
 LENSES: dict[str, Lens] = {
     "pinhole": Lens("pinhole", (0,), _pinhole_to_plane, _pinhole_to_ray),
-    "brown_conrady": Lens("Brown-Conrady (OpenCV)", (5, 8, 12, 14), _brown_to_plane, _brown_to_ray),
-    "fisheye": Lens("Kannala-Brandt fisheye", (4,), _fisheye_to_plane, _fisheye_to_ray),
+    "brown_conrady": Lens(
+        "Brown-Conrady (OpenCV)", (5, 8, 12, 14), _brown_to_plane, _brown_to_ray, True, _brown_formula
+    ),
+    "fisheye": Lens("Kannala-Brandt fisheye", (4,), _fisheye_to_plane, _fisheye_to_ray, True, _fisheye_formula),
     "equirectangular": Lens("equirectangular panorama", (0,), _panorama_to_plane, _panorama_to_ray, False),
 }
 """Every lens model. In a file or an option they go by these names."""
