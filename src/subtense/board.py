@@ -95,13 +95,19 @@ class Board:
         """
         if self.kind == "circles":
             return float(np.ptp(self.points_m[:, 0]))
-        return (self.columns - 1) * self.square_m + self.marker_m if self.kind == "aprilgrid" else self.columns * self.square_m
+        return (
+            (self.columns - 1) * self.square_m + self.marker_m
+            if self.kind == "aprilgrid"
+            else self.columns * self.square_m
+        )
 
     @property
     def text(self) -> str:
         """As people say it: "chessboard of 10 x 7 squares of 25 mm"."""
-        many = {"circles": "circles", "aprilgrid": "tags"}.get(self.kind, "squares")
-        return f"{self.kind} of {self.columns} x {self.rows} {many}, {self.square_m * 1000:.6g} mm"
+        what, many = {
+            "charuco": ("ChArUco board", "squares"), "circles": ("grid", "circles"), "aprilgrid": ("AprilGrid", "tags"),
+        }.get(self.kind, (self.kind, "squares"))  # fmt: skip
+        return f"{what} of {self.columns} x {self.rows} {many}, {self.square_m * 1000:.6g} mm"
 
     def to_json(self) -> dict[str, Any]:
         """All fields."""

@@ -427,6 +427,34 @@ def _audit(check: str, pictures: list[Path], board: Board, width: Quantity | Non
         sys.exit(3)
 
 
+@main.command(
+    epilog="Example: subtense board charuco --squares 10x7 --square '25 mm' --marker '18 mm' --dictionary 4x4_50 -o board.pdf"
+)
+@click.argument("kind", metavar="KIND")
+@click.option("--squares", metavar="COLUMNSxROWS", help="How many squares (circles, tags) across and down, as 10x7.")
+@click.option("--square", metavar="LENGTH", help="Side of a square, mm if bare; of circles the distance from row to row, "
+              "of an AprilGrid from a tag's left side to the next tag's.")  # fmt: skip
+@click.option("--marker", metavar="LENGTH", help="Side of a marker's black square, mm if bare.")
+@click.option("--dictionary", metavar="NAME", help="Of the markers, as 4x4_50 or 36h11.")
+@click.option("--legacy", is_flag=True, help="A ChArUco pattern of OpenCV before 4.6.")
+@click.option("--paper", default="A4", show_default=True, metavar="PAPER",
+              help="A4, A3, A2, letter, legal, tabloid, or width x height in mm, as 300x400.")  # fmt: skip
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Write it here: .pdf or .svg.")
+def board(kind: str, squares: str | None, square: str | None, marker: str | None, dictionary: str | None, legacy: bool,
+          paper: str, output: Path) -> None:  # fmt: skip
+    """A calibration board to print at exact scale, with rulers to check the print: KIND is chessboard, charuco, circles
+    or aprilgrid.
+    """
+    from .reports.board_sheet import write
+    from .workflow.calibrate_input import board_of
+
+    made = board_of(kind, squares, square, marker, dictionary, legacy=legacy)
+    sheet = write(made, output, paper)
+    click.echo(f"{output}: {made.text}, on paper of {sheet.width_mm:g} x {sheet.height_mm:g} mm")
+    wide_mm = made.width_m * 1000
+    click.echo(f"Print it at 100 %, measure {wide_mm:.6g} mm across, and give what you find to calibrate --printed.")
+
+
 @main.command()
 @click.argument("words", nargs=-1)
 def presets(words: tuple[str, ...]) -> None:
