@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..adjustment import Adjusted, LensModel, Problem, Sight, adjust, start_state
+from ..adjustment import Adjusted, LensModel, Problem, Sight, adjust
+from ..adjustment_start import start_state
 from ..arrays import Array
 from ..board import Board
 from ..calibration import Audit, Calibration

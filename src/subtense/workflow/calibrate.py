@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..adjustment import LENS_MODELS, Adjusted, LensModel, Problem, Sight, adjust, start_state
+from ..adjustment import LENS_MODELS, Adjusted, LensModel, Problem, Sight, adjust
+from ..adjustment_start import start_state
 from ..arrays import Array
 from ..board import Board, BoardView
 from ..calibration import Calibration, Picture, doubts
