@@ -98,7 +98,8 @@ def test_doubts_go_with_the_camera(take):
 
 
 @pytest.mark.parametrize(
-    "notes", [{}, [1], [{"code": 1, "message": "a"}], [{"code": "a"}], [{"code": "a", "message": "b" * 501}], [{}] * 51]
+    "notes",
+    [{}, [1], [{"code": 1, "message": "a"}], [{"code": "a"}], [{"code": "a", "message": "b", "cure": 1}], [{}] * 51],
 )
 def test_notes_of_the_wrong_kind_are_refused(take, notes):
     with pytest.raises(FileFormatError, match="note"):

@@ -258,6 +258,13 @@ def test_our_own_refusals(change, wrong):
         read(json.dumps({**OURS, **change}), "c.json")
 
 
+def test_one_of_our_rig():
+    rig = json.dumps({"rig": {"left": OURS, "right": {**OURS, "f_px": 950}, "cov": []}, "notes": []})
+    assert read(rig, "rig.json#right").camera.f_px == 950
+    with pytest.raises(FileFormatError, match=r"has 2 cameras \(left, right\); choose one, as rig\.json#left"):
+        read(rig, "rig.json")
+
+
 def test_ours_keeps_covariance_notes_and_frame():
     camera = replace(perspective(K5), cov=np.diag([1.2, 0.1, 0.8, 0.8, 0.002, 0.01, 0.0001, 0.0001, 0.0]) ** 2)
     found = Found(camera, (Note("model_error", "misfits at the edges", "another lens model"),), "stored")
@@ -564,3 +571,13 @@ def test_selectors():
         (640, 480), False, "v2 a, b 640 perspective 0"
     )
     assert selector.split("a#b.yml#M1")[0] == Path("a#b.yml")
+
+
+def test_the_page_lists_every_format():
+    text = (Path(__file__).parent.parent / "docs" / "calibration-files.md").read_text("utf-8")
+    listed = [
+        line.split("`")[1]
+        for line in text.split("## Formats")[1].split("\n## ")[0].splitlines()
+        if line.startswith("| `")
+    ]
+    assert sorted(listed) == sorted(formats.FORMATS)

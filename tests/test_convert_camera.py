@@ -45,8 +45,7 @@ def test_what_is_lost_is_said_in_one_line(run):
     found = run("convert", "c.json", "c.yml")
     assert found.exit_code == 0
     assert (
-        found.stderr
-        == "note: c.yml: OpenCV YAML does not keep the uncertainty (covariance), the notes model_error\n"
+        found.stderr == "note: c.yml: OpenCV YAML does not keep the uncertainty (covariance), the notes model_error\n"
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..camera import Camera
 from ..errors import FileFormatError, InputError
+from ..lenses import LENSES
 from . import (
     colmap,
     flow_text,
@@ -72,8 +73,7 @@ SYNTAXES: dict[str, Callable[[object, bytes], Any]] = {
 FORMATS: dict[str, Format] = {
     row.name: row
     for row in (
-        Format("subtense", "subtense JSON", "json", (".json",), own.tells, own.read, own.write,
-               (*_ALL_BUT_PANORAMA, "equirectangular")),
+        Format("subtense", "subtense JSON", "json", (".json",), own.tells, own.read, own.write, tuple(LENSES)),
         Format("opensfm", "OpenSfM camera_models.json", "json", (".json",), opensfm.tells, opensfm.read, opensfm.write,
                (*_ALL_BUT_PANORAMA, "equirectangular")),
         Format("matlab", "MATLAB JSON", "json", (".json",), matlab.tells, matlab.read, matlab.write, _PERSPECTIVE),

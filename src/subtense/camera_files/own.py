@@ -1,4 +1,4 @@
-"""Our own JSON: a camera as `Camera.to_json` gives it, alone or under "camera", as in every report.
+"""Our own JSON: a camera as `Camera.to_json` gives it, alone or under "camera", as in every report; or "left" and "right" under "rig".
 
 Beside "camera" may stand "notes", doubts that go wherever the camera goes, and "frame": "stored" where the calibration is
 of pictures before their EXIF orientation was applied.
@@ -16,7 +16,7 @@ from .reading import Found, Reading
 
 _NUMBERS = ("width_px", "height_px", "f_px", "cx_px", "cy_px")
 _OPTIONAL = ("aspect", "nominal_focal_m")
-_MOST_NOTES, _LONGEST_NOTE = 50, 500
+_MOST_NOTES, _LONGEST_NOTE = 50, 1000
 _OF_THE_CHOICE = "camera_source"
 """A report's note on how its camera was chosen; it is no doubt about the camera."""
 
@@ -25,18 +25,14 @@ def tells(tree: Any) -> bool:
     """Whether this is one."""
     if not isinstance(tree, dict):
         return False
-    inner = tree.get("camera")
+    inner = tree.get("camera", tree.get("rig"))
     return "f_px" in tree or (isinstance(inner, dict) and "projection_type" not in inner)  # that is a camera of OpenSfM
 
 
 def read(reading: Reading) -> Found:
     """The camera, its covariance and its notes."""
-    reading.none_to_choose()
-    tree = reading.content
-    inner = tree.get("camera") if isinstance(tree, dict) else None
-    data = inner if isinstance(inner, dict) else tree
-    if not isinstance(data, dict):
-        raise reading.refused("holds no camera")
+    tree = reading.mapping(reading.content, "the file")
+    data = _chosen(reading, tree)
     for key in _NUMBERS:
         if not isinstance(data.get(key), (int, float)) or isinstance(data.get(key), bool):
             raise reading.refused(f"{key} is missing or no number")
@@ -49,6 +45,17 @@ def read(reading: Reading) -> Found:
     if frame not in ("", "stored", "upright"):
         raise reading.refused('frame must be "stored" or "upright"')
     return Found(_camera(reading, data), _notes(reading, tree.get("notes")), frame)
+
+
+def _chosen(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
+    """The camera's own part: the file itself, or under "camera", or one of two under "rig"."""
+    rig = tree.get("rig")
+    if isinstance(rig, dict):
+        sides: dict[str, dict[str, Any]] = {s: rig[s] for s in ("left", "right") if isinstance(rig.get(s), dict)}
+        return reading.one(sides)[1]
+    reading.none_to_choose()
+    inner = tree.get("camera")
+    return inner if isinstance(inner, dict) else tree
 
 
 def _camera(reading: Reading, data: dict[str, Any]) -> Camera:
@@ -80,10 +87,15 @@ def _notes(reading: Reading, data: Any) -> tuple[Note, ...]:
 def _note(reading: Reading, item: Any) -> Note:
     item = reading.mapping(item, "a note")
     said = [item.get("code"), item.get("message", item.get("text")), item.get("cure", "")]
-    if not all(isinstance(text, str) and len(text) <= _LONGEST_NOTE for text in said) or not said[0]:
-        raise reading.refused(f"a note must have code, message and cure, texts of at most {_LONGEST_NOTE} characters")
-    code, text, cure = (" ".join("".join(c if c.isprintable() else " " for c in text).split()) for text in said)
+    if not all(isinstance(text, str) for text in said) or not said[0]:
+        raise reading.refused("a note must have code, message and cure, all of them texts")
+    code, text, cure = map(_one_line, said)
     return Note(code, text, cure)
+
+
+def _one_line(text: str) -> str:
+    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return line if len(line) <= _LONGEST_NOTE else line[: _LONGEST_NOTE - 3] + "..."
 
 
 def write(found: Found) -> str:

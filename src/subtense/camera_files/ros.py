@@ -37,7 +37,9 @@ def read(reading: Reading) -> Found:
     fx, fy, cx, cy = reading.focal_and_centre(reading.numbers(tree.get(matrix_key), matrix_key, (9,)), matrix_key)
     k = reading.numbers(tree.get(k_key), k_key) if tree.get(k_key) is not None else []
     model = tree.get("distortion_model") or ("plumb_bob" if len(k) <= 5 else "rational_polynomial")
-    if model not in _COUNTS:
+    if model == "fisheye":  # as some drivers call it
+        model = "equidistant"
+    if not isinstance(model, str) or model not in _COUNTS:
         raise reading.refused(f"distortion_model {str(model)[:40]!r} is not read; {', '.join(_COUNTS)} are")
     if k or model == "equidistant":
         k = reading.numbers(tree.get(k_key), k_key, _COUNTS[model])
