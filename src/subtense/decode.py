@@ -23,6 +23,7 @@ import numpy as np
 
 from .arrays import Pixels
 from .errors import FileFormatError, InputError, MissingExtraError
+from .heif_boxes import camera_matrix
 from .tiff_tags import camera_tags, is_raw_tiff, preview_size, raw_camera_tags, xmp_packet
 
 MOST_EXIF_BYTES = 2**20
@@ -378,20 +379,11 @@ def _open_heic(data: bytes, label: object) -> Opened:
         found = picture.info.get("xmp")
         return Beside(
             found if isinstance(found, bytes) else None,
-            intrinsic_matrix=_matrix(picture.info.get("camera_intrinsic_matrix")),
+            intrinsic_matrix=camera_matrix(data),
             exif=(exif, 6 if exif.startswith(b"Exif\0\0") else 0) if exif else None,
         )
 
     return Opened("HEIC", *_size_px(picture), tags, beside, decode)
-
-
-def _matrix(told: Any) -> tuple[float, ...] | None:
-    """The camera matrix row by row, as libheif has it for the picture as it is looked at."""
-    if not isinstance(told, dict):
-        return None
-    f = [float(told.get(name, 0.0)) for name in ("focal_length_x", "focal_length_y")]
-    c = [float(told.get(name, 0.0)) for name in ("principal_point_x", "principal_point_y", "skew")]
-    return f[0], c[2], c[0], 0.0, f[1], c[1], 0.0, 0.0, 1.0
 
 
 def _heic_rows(array: Pixels, mode: str) -> Pixels:

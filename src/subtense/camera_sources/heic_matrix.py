@@ -1,9 +1,9 @@
 """Camera from the intrinsic matrix that a HEIC may carry (box `cmin`), as Apple's phones write it for spatial photos.
 
-The matrix is of the picture as it is looked at: the decoder takes it through the container's own turn and crop. Its origin is the
+The matrix is of the picture as it is looked at: `heif_boxes` takes it through the container's own turn and crop. Its origin is the
 outer corner of the top-left pixel. Distortion is not part of it; phones correct it, within what is assumed of their class.
 
-Source: ISO/IEC 23008-12, CameraIntrinsicMatrixProperty; libheif, `heif_camera_intrinsic_matrix`.
+Source: ISO/IEC 23008-12, CameraIntrinsicMatrixProperty.
 """
 
 from __future__ import annotations
