@@ -545,6 +545,14 @@ def test_binary_refusals():
             read(content, "cameras.bin")
 
 
+def test_what_is_no_calibration_at_all():
+    picture = (Path(__file__).parent.parent / "examples" / "belt.jpg").read_bytes()[:10_000]
+    for content in (picture, "K: 1".encode("utf-16")):
+        with pytest.raises(FileFormatError, match=r"is neither a text in UTF-8 nor a cameras\.bin"):
+            read(content, "belt.jpg")
+    assert read((HERE / "cameras.bin").read_bytes(), "cameras#2").camera.lens == "pinhole"
+
+
 def test_a_lens_that_folds_over_inside_of_the_picture_is_refused():
     text = SIZE + f"K: {MATRIX.replace('900', '300').replace('901', '300')}\nD: [-0.4, 0, 0, 0, 0]"
     with pytest.raises(FileFormatError, match=r"its lens distortion turns back \d+ px from the principal point"):

@@ -71,6 +71,11 @@ def tells_text(text: str) -> bool:
     return bool(_LINE.match(first)) or "# Camera list" in text[:200]
 
 
+def tells_binary(content: bytes) -> bool:
+    """Whether this is a cameras.bin: its first eight bytes are a number of cameras that fit into it."""
+    return len(content) >= 8 and struct.unpack_from("<Q", content)[0] * (24 + 8 * 3) <= len(content) - 8
+
+
 def read_text(reading: Reading) -> Found:
     """The camera of a cameras.txt."""
     cameras: dict[str, _Row] = {}

@@ -89,7 +89,7 @@ FORMATS: dict[str, Format] = {
         Format("mrcal", "mrcal .cameramodel", "literal", (".cameramodel",), mrcal.tells, mrcal.read, mrcal.write, _PERSPECTIVE),
         Format("colmap", "COLMAP cameras.txt", "text", (".txt",), colmap.tells_text, colmap.read_text, colmap.write_text,
                _ALL_BUT_PANORAMA),
-        Format("colmap_bin", "COLMAP cameras.bin", "binary", (".bin",), lambda _: True, colmap.read_binary,
+        Format("colmap_bin", "COLMAP cameras.bin", "binary", (".bin",), colmap.tells_binary, colmap.read_binary,
                colmap.write_binary, _ALL_BUT_PANORAMA),
     )
 }  # fmt: skip
@@ -150,7 +150,12 @@ def _row_and_tree(path: object, content: bytes, form: str | None) -> tuple[Forma
 
 def _syntax(path: object, content: bytes) -> str:
     """What the content looks like."""
+    ending = Path(str(path)).suffix.lower()
     if b"\0" in content[:4096]:
+        if ending != ".bin" and not colmap.tells_binary(content):
+            raise FileFormatError(
+                path, "is neither a text in UTF-8 nor a cameras.bin; give the file that the calibration wrote"
+            )
         return "binary"
     text = _decoded(path, content).removeprefix("\ufeff")
     bare = "\n".join(line for line in text[:4096].splitlines() if not line.lstrip().startswith("#")).lstrip()
@@ -162,7 +167,6 @@ def _syntax(path: object, content: bytes) -> str:
         return "json"
     if colmap.tells_text(text):
         return "text"
-    ending = Path(str(path)).suffix.lower()
     return "json" if ending == ".json" else "literal" if ending == ".cameramodel" else "yaml"
 
 
