@@ -10,6 +10,7 @@ Source: mrcal, "Uncertainty" and "Formulation" (board warp, cross-validation); F
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -96,13 +97,24 @@ def _better(solution: Adjusted, problem: Problem, start: State) -> tuple[Adjuste
     """The richer solution and the probability that noise alone makes it so much better; None where it can't be had."""
     from scipy.stats import f as fisher
 
-    try:
-        richer = adjust(problem, start)
-    except GeometryError:
+    found = []
+    for begin in _starts(problem, start):
+        with suppress(GeometryError):
+            found.append(adjust(problem, begin))
+    if not found:
         return None
+    richer = min(found, key=lambda a: a.chi2)
     more = solution.dof - richer.dof
     statistic = (solution.chi2 - richer.chi2) / more / (richer.chi2 / richer.dof)
     return richer, float(fisher.sf(statistic, more, richer.dof))
+
+
+def _starts(problem: Problem, start: State) -> tuple[State, ...]:
+    """The start, and for a rational lens one without distortion: its solutions lie in valleys that don't lead to each other."""
+    if not any(m.count >= 8 for m in problem.models):
+        return (start,)
+    plain = tuple(np.concatenate([i[:4], np.zeros(i.size - 4)]) for i in start.intrinsics)
+    return (start, replace(start, intrinsics=plain))
 
 
 def _shift(solution: Adjusted, richer: Adjusted) -> Array:

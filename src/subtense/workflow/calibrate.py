@@ -15,7 +15,7 @@ from ..adjustment_start import start_state
 from ..arrays import Array
 from ..board import Board, BoardView
 from ..calibration import Calibration, Picture, doubts
-from ..calibration_checks import checks_of, ranges_m, tilts_rad, widened
+from ..calibration_checks import checks_of, ranges_m, tilts_rad, warp_check, widened
 from ..calibration_maps import next_picture
 from ..errors import FileFormatError, GeometryError, InputError, NothingFoundError
 from ..geometry import Pose
@@ -184,23 +184,24 @@ def calibrate_views(seen: Seen | Sequence[BoardView], board: Board, *, model: st
     sights = tuple(Sight(0, n, view) for n, i in enumerate(order) if (view := seen.views[i]) is not None)
     first = LENS_MODELS[model or "opencv5"]
     problem = Problem(board, sights, (first,), (size,), free_aspect=not square_pixels)
-    solution, kept, why = without_outliers(_robust_start(problem))
+    solution, kept, why = without_outliers(_first_solution(problem, model))
     tried: dict[str, float] = {}
     if model is None:
-        solution, tried = chosen_model(solution)
+        solution, tried = _chosen_flat(solution)
     left = {order[frame]: reason for frame, reason in why.items()}
     return _finished(solution, board, seen, [order[f] for f in kept], left, tried, notes)
 
 
-def _robust_start(problem: Problem) -> Adjusted:
-    """A first solution; where the model is too rich for the pictures, from a leaner one."""
+def _first_solution(problem: Problem, asked: str | None) -> Adjusted:
+    """A first solution; where no model was asked for and the usual one is too rich for the pictures, of a leaner one."""
+    start = start_state(problem)
     try:
-        return adjust(problem, start_state(problem))
+        return adjust(problem, start)
     except GeometryError as error:
-        lean = replace(problem, models=(LENS_MODELS["k1"],))
-        if error.code == "no_convergence" or problem.models[0].lens != "brown_conrady":
+        if asked is not None or error.code == "no_convergence":
             raise
-        return adjust(lean, start_state(lean))
+    lean = replace(problem, models=(LENS_MODELS["k1"],))
+    return adjust(lean, start)
 
 
 def without_outliers(solution: Adjusted) -> tuple[Adjusted, list[int], dict[int, str]]:
@@ -286,6 +287,15 @@ def chosen_model(
             best = name
             break
     return fitted[best], {name: float(np.sqrt(2 * m)) for name, m in means.items()}
+
+
+def _chosen_flat(solution: Adjusted) -> tuple[Adjusted, dict[str, float]]:
+    """The model chosen with the board let bow if it seems to, as a richer lens would swallow a bow; the solution is of a flat one."""
+    bow = warp_check(solution)
+    if bow is None or bow.better is None:
+        return chosen_model(solution)
+    chosen, tried = chosen_model(bow.better)
+    return adjust(replace(chosen.problem, free_warp=False), replace(chosen.state, warp_m=np.zeros(2))), tried
 
 
 def _with_model(solution: Adjusted, model: LensModel) -> Adjusted:
