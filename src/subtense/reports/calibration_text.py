@@ -24,8 +24,7 @@ from ..calibration_summary import (
     size_text,
     verdict,
 )
-from ..distribution import HALF_WIDTH_95
-from .rounding import digits_for, fitting_unit, grouped, number
+from .rounding import interval, number, rounded
 
 WIDTH = 100
 NAME_WIDTH = 36
@@ -66,31 +65,12 @@ def _table(numbers: Sequence[Number]) -> Iterator[str]:
     """The first one with its interval, the others with u alone."""
     width = max(len(n.name) for n in numbers)
     for i, n in enumerate(numbers):
-        value, u = shown(n), ""
+        value, u = rounded(n.value, n.unit, n.u), ""
         if n.u:
-            u = f"u {doubt(n)}" if i else f"95 %: {interval(n)}   (u {doubt(n)}, {percent(n.u / abs(n.value))})"
+            u = f"u {number(n.u, n.unit, n.u, reference=n.value)}"
+            if not i:
+                u = f"95 %: {interval(n.value, n.unit, n.u)}   ({u}, {percent(n.u / abs(n.value))})"
         yield f"  {n.name:<{width}}  {value:>14}   {u:<16} {n.remark}".rstrip()
-
-
-def shown(n: Number) -> str:
-    """Value with its unit, to two digits of u."""
-    if n.u:
-        return number(n.value, n.unit, n.u)
-    name, factor = fitting_unit(n.value, n.unit)
-    return f"{n.value / factor:.4g} {name}".strip()
-
-
-def doubt(n: Number) -> str:
-    """The u, in the unit that the value is shown in."""
-    return number(n.u, n.unit, n.u, reference=n.value)
-
-
-def interval(n: Number) -> str:
-    """The ends of the 95 % interval."""
-    name, factor = fitting_unit(n.value, n.unit)
-    decimals = max(digits_for(n.u / factor), 0)
-    low, high = (grouped((n.value + sign * HALF_WIDTH_95 * n.u) / factor, decimals) for sign in (-1, 1))
-    return f"{low} to {high}{'' if name == '°' else ' '}{name}".strip()
 
 
 # -- what it rests on --------------------------------------------------------------------------------

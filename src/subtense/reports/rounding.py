@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..distribution import HALF_WIDTH_95
+
 _LENGTHS = (("km", 1e4, 1e3), ("m", 1.0, 1.0), ("mm", 1e-3, 1e-3), ("µm", 0.0, 1e-6))
 _FIXED = {
     "px": ("px", 1.0), "rad": ("°", math.pi / 180), "px/m": ("px/mm", 1e3), "m/px": ("mm/px", 1e-3), "1": ("", 1.0),
@@ -39,3 +41,19 @@ def number(value: float, unit: str, doubt: float | None, reference: float | None
     else:
         shown = f"{value / factor:.7g}"
     return f"{shown}{'' if name == '°' else ' '}{name}".strip()
+
+
+def rounded(value: float, unit: str, u: float) -> str:
+    """A number with its unit, to two significant digits of u; to four of its own where u is 0."""
+    if u:
+        return number(value, unit, u)
+    name, factor = fitting_unit(value, unit)
+    return f"{value / factor:.4g}{'' if name == '°' else ' '}{name}".strip()
+
+
+def interval(value: float, unit: str, u: float) -> str:
+    """The ends of the normal law's 95 % interval, as "13.1 to 14.2 m"."""
+    name, factor = fitting_unit(value, unit)
+    decimals = max(digits_for(u / factor), 0)
+    low, high = (grouped((value + sign * HALF_WIDTH_95 * u) / factor, decimals) for sign in (-1, 1))
+    return f"{low} to {high}{'' if name == '°' else ' '}{name}".strip()
