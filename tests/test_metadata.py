@@ -2,18 +2,18 @@ import json
 import math
 import struct
 
+import heic_boxes
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from written_photos import exif, packet, write
 
-import heic_boxes
 from subtense.errors import FileFormatError
 from subtense.metadata import Metadata
 from subtense.photo import Photo
 from subtense.workflow.resolve_camera import CAMERA_SOURCES
-from written_photos import exif, packet, write
 
 ALL = {
     "make": "Maker", "model": "Model", "software": "Firmware 3", "lens": "Lens 4 mm", "focal": 4.25, "f35": 26, "f_number": 1.8,
@@ -49,7 +49,13 @@ def test_exif_and_xmp_are_read_from_a_heic(tmp_path):
 
 
 def test_what_exif_leaves_out_xmp_tells(tmp_path):
-    xmp = packet(exif_FocalLength="350/10", exif_FocalLengthIn35mmFilm="52", exifEX_LensModel="Long", tiff_Make="M", exif_FNumber="28/10")
+    xmp = packet(
+        exif_FocalLength="350/10",
+        exif_FocalLengthIn35mmFilm="52",
+        exifEX_LensModel="Long",
+        tiff_Make="M",
+        exif_FNumber="28/10",
+    )
     found = told(write(tmp_path / "a.png", xmp=xmp, make="Own"))
     assert (found.focal_mm, found.f35_mm, found.lens, found.make, found.f_number) == (35.0, 52.0, "Long", "Own", 2.8)
 
@@ -101,7 +107,9 @@ def test_an_xmp_packet_of_a_jpeg_that_is_split_is_joined(tmp_path):
     data = (tmp_path / "a.jpg").read_bytes()
     more = b""
     for number, piece in enumerate(pieces):
-        body = b"http://ns.adobe.com/xmp/extension/\0" + b"0" * 32 + struct.pack(">LL", len(xmp), number * 60_000) + piece
+        body = (
+            b"http://ns.adobe.com/xmp/extension/\0" + b"0" * 32 + struct.pack(">LL", len(xmp), number * 60_000) + piece
+        )
         more += b"\xff\xe1" + struct.pack(">H", len(body) + 2) + body
     (tmp_path / "a.jpg").write_bytes(data[:2] + more + data[2:])
     assert len(pieces) == 2
@@ -128,7 +136,12 @@ def test_a_packet_over_the_limit_is_left_out(tmp_path):
 
 def test_positions_and_serial_numbers_are_not_read(tmp_path):
     secret = "SECRET123"
-    xmp = packet(drone_dji_GpsLatitude="47.123456", drone_dji_CameraSerialNumber=secret, aux_SerialNumber=secret, drone_dji_AbsoluteAltitude="+501.5")
+    xmp = packet(
+        drone_dji_GpsLatitude="47.123456",
+        drone_dji_CameraSerialNumber=secret,
+        aux_SerialNumber=secret,
+        drone_dji_AbsoluteAltitude="+501.5",
+    )
     photo = Photo.load(write(tmp_path / "a.jpg", xmp=xmp, body_serial=secret, lens_serial=secret, f35=26))
     shown = json.dumps(photo.metadata.to_json()) + json.dumps(photo.to_json())
     for word in (secret, "47.123", "501.5"):

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from written_photos import packet, write
 
 from subtense.errors import UnknownCameraError
 from subtense.photo import Photo
 from subtense.workflow.resolve_camera import resolve_camera
-from written_photos import packet, write
 
 DIAGONAL_MM = math.hypot(36, 24)
 PHONE = {"make": "Apple", "model": "iPhone 11", "f35": 26, "focal": 4.25, "f_number": 1.8, "exposure": 0.01}
@@ -52,7 +52,9 @@ def test_a_crop_of_a_picture_that_was_turned_after_has_its_middle_on_either_side
     """A raw picture 4000 x 3000, cut to 3000 x 3000 at its left, and written upright after."""
     found = take((1500, 2000), xmp=crop(0.0, 0.0, 0.5, 0.5), **PHONE)
     assert found.camera.f_px == pytest.approx(26 * 5000 / DIAGONAL_MM)
-    turned = take((1800, 2000), xmp=crop(0.0, 0.1, 0.5, 0.7), **PHONE)  # 2000 x 1800 of 4000 x 3000, turned by a quarter
+    turned = take(
+        (1800, 2000), xmp=crop(0.0, 0.1, 0.5, 0.7), **PHONE
+    )  # 2000 x 1800 of 4000 x 3000, turned by a quarter
     assert turned.camera.f_px == pytest.approx(26 * 5000 / DIAGONAL_MM)
     off = 0.25 * 4000  # the middle lies that far off, up or down
     assert abs(turned.camera.cy_px - 999.5) < 1
@@ -188,10 +190,14 @@ def test_every_orientation_gives_the_same_camera_of_the_upright_picture(tmp_path
 
 
 def test_tags_of_two_lenses_of_a_phone_are_told(take):
-    found = take(make="Apple", model="iPhone 13 Pro", lens="iPhone 13 Pro back triple camera 9mm f/2.8", focal=5.7, f35=26)
+    found = take(
+        make="Apple", model="iPhone 13 Pro", lens="iPhone 13 Pro back triple camera 9mm f/2.8", focal=5.7, f35=26
+    )
     assert "lens_ambiguous" in codes(found)
     assert relative(found) > 0.3
-    same = take(make="Apple", model="iPhone 13 Pro", lens="iPhone 13 Pro back triple camera 5.7mm f/1.5", focal=5.7, f35=26)
+    same = take(
+        make="Apple", model="iPhone 13 Pro", lens="iPhone 13 Pro back triple camera 5.7mm f/1.5", focal=5.7, f35=26
+    )
     assert codes(same) == []
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Pixels
-from .decode import Buffer, Opened, as_stored, open_picture, upright
+from .decode import Beside, Buffer, as_stored, open_picture, upright
 from .errors import FileFormatError
 from .metadata import Metadata, metadata_of, text_of
 from .quantity import Note
@@ -99,12 +99,13 @@ class Photo:
         label: object = path if name is None else shown
         data = file_bytes(path, label)
         opened = open_picture(data, label, Path(name or path).suffix)
-        _check_size(label, opened.width_px, opened.height_px, most_pixels)
-        metadata, notes = _metadata(opened)
+        check_size(label, opened.width_px, opened.height_px, most_pixels)
+        tags = opened.tags()  # before the pixels are decoded: turning them takes the orientation away
         decoded = opened.decode()
-        _check_size(
+        check_size(
             label, decoded.width_px, decoded.height_px, most_pixels
         )  # a container may hold another size than it tells
+        metadata, notes = _metadata(opened.form, tags, opened.beside())  # of a PNG some of it stands behind the pixels
         array = upright(decoded, label, pixels)
         photo = cls(array, metadata, path, hashlib.sha256(data).hexdigest(), notes, shown)
         return replace(photo, metadata=_without_margins(photo)) if opened.form == "RAW" else photo
@@ -115,7 +116,8 @@ def _shown(name: str | None) -> str:
     return text_of((name or "").replace("\\", "/").rsplit("/", 1)[-1]) or ""
 
 
-def _check_size(label: object, width_px: int, height_px: int, most_pixels: int) -> None:
+def check_size(label: object, width_px: int, height_px: int, most_pixels: int = MOST_PIXELS) -> None:
+    """Refuse a picture of more pixels; `label` is what it is called in the error."""
     if width_px * height_px > most_pixels:
         raise FileFormatError(label, f"{width_px} x {height_px} px are {width_px * height_px / 1e6:.0f} million; the limit is "
                               f"{most_pixels // 10**6} million, so resize it")  # fmt: skip
@@ -143,11 +145,10 @@ def file_bytes(path: Path, label: object) -> bytes:
 # -- metadata --------------------------------------------------------------------------------------------
 
 
-def _metadata(opened: Opened) -> tuple[Metadata, tuple[Note, ...]]:
+def _metadata(form: str, tags: dict[int, Any] | None, beside: Beside) -> tuple[Metadata, tuple[Note, ...]]:
     """What the file tells; a damaged part of it is noted and does not hide the others."""
-    tags, beside = opened.tags(), opened.beside()
     properties = _properties(beside.xmp)
-    told = metadata_of(tags or {}, beside, properties or {}, form=opened.form)
+    told = metadata_of(tags or {}, beside, properties or {}, form=form)
     if tags is not None and properties is not None:
         return told
     what = "metadata" if tags is None else "XMP metadata"

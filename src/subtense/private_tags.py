@@ -13,7 +13,7 @@ from typing import Any
 
 from .decode import open_picture
 from .metadata import number, text_of
-from .photo import file_bytes
+from .photo import check_size, file_bytes
 from .tiff_tags import private_tags as tags_of
 from .xmp import properties
 
@@ -32,7 +32,10 @@ def private_tags(path: Path) -> dict[str, str]:
     Raises:
         FileFormatError: no such file, or no picture.
     """
-    beside = open_picture(file_bytes(path, path), path, path.suffix).beside()
+    opened = open_picture(file_bytes(path, path), path, path.suffix)
+    check_size(path, opened.width_px, opened.height_px)
+    opened.tags()  # of a PNG they may stand behind the pixels
+    beside = opened.beside()
     found: dict[str, str] = {}
     if beside.exif is not None:
         found |= _by_exif(tags_of(*beside.exif))
@@ -54,8 +57,8 @@ def _by_exif(tags: Mapping[int, Any]) -> dict[str, str]:
     if height is not None:
         below = tags.get(5) == 1
         found["altitude above the sea"] = f"{-height if below else height:.1f} m"
-    serials = {what: text_of(tags.get(tag)) for tag, what in _SERIALS.items()}
-    return found | {what: text for what, text in serials.items() if text}
+    serials = ((what, text_of(tags.get(tag))) for tag, what in _SERIALS.items())
+    return found | {what: text for what, text in serials if text}
 
 
 def _degrees(value: Any) -> float | None:
