@@ -283,8 +283,9 @@ def lengths(board: Board) -> str:
     doubt = f"u {percent(board.relative_u)}" if board.relative_u else "taken as exact"
     if board.source.startswith("measured"):
         return f"lengths rest on the width of the print as it was measured ({doubt})"
+    what = "square" if board.kind in ("chessboard", "charuco") else "spacing"
     said = f", {board.source}" if board.source not in ("", "stated") else ""
-    return (f"lengths rest on the stated size of {board.square_m * 1000:.6g} mm ({doubt}{said}), which pictures can't show; "
+    return (f"lengths rest on the stated {what} of {board.square_m * 1000:.6g} mm ({doubt}{said}), which pictures can't show; "
             f"focal lengths don't depend on it. Measure the whole width of the pattern, {board.width_m * 1000:.6g} mm by what was "
             "stated, and give it with --printed")  # fmt: skip
 

@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 
@@ -51,6 +52,7 @@ p, ul, ol { margin: .4rem 0; max-width: 56rem; }
 .verdict.gaps { border-color: var(--gaps); } .gaps h2 { color: var(--gaps); }
 .verdict.doubtful { border-color: var(--doubtful); } .doubtful h2, .failed { color: var(--doubtful); }
 .passed, .failed { font-weight: 700; }
+code { white-space: nowrap; font-size: .95em; }
 .wide { overflow-x: auto; margin: .8rem 0 1.4rem; }
 table { border-collapse: collapse; width: 100%; font-size: .94rem; }
 caption { text-align: left; font-weight: 700; padding: .3rem 0; }
@@ -136,7 +138,12 @@ def html(calibration: Calibration, plots: Sequence[Plot] = ()) -> str:
 
 
 def _told(text: str) -> str:
-    """Text of strangers in HTML; a number and its percent sign stay together."""
+    """Text of strangers in HTML; a number and its percent sign stay together, and so do options."""
+    return re.sub(r"--[a-z]+", r"<code>\g<0></code>", _plain(text))
+
+
+def _plain(text: str) -> str:
+    """The same without markup, as attributes need it."""
     return escape(printable(text)).replace(" %", "&nbsp;%")
 
 
@@ -182,19 +189,16 @@ def _number_table(caption: str, numbers: Sequence[Number]) -> str:
         cells = [rounded(n.value, n.unit, n.u), u + share, interval(n.value, n.unit, n.u) if n.u else ""]
         numeric = "".join(f'<td class="number">{_told(cell)}</td>' for cell in cells)
         name = f'<th scope="row">{_told(n.name)}</th>'
-        rows.append(
-            f'<tr{"" if i else ' class="headline"'}>{name}{numeric}<td class="words">{_told(n.remark)}</td></tr>'
-        )
+        row = '<tr class="headline">' if i == 0 else "<tr>"
+        rows.append(f'{row}{name}{numeric}<td class="words">{_told(n.remark)}</td></tr>')
     return _table(caption, ("number", "value:n", "u:n", "95 % interval:n", "remark"), rows)
 
 
 def _table(caption: str, heads: Sequence[str], rows: Iterable[str]) -> str:
     """A table that scrolls sideways where it has to; ":n" marks columns of numbers."""
-    cells = "".join(
-        f'<th scope="col"{' class="number"' if head.endswith(":n") else ""}>{_told(head.removesuffix(":n"))}</th>'
-        for head in heads
-    )
-    return (f'<div class="wide" role="region" aria-label="{_told(caption)}" tabindex="0"><table><caption>{_told(caption)}</caption>'
+    numeric = {True: ' class="number"', False: ""}
+    cells = "".join(f'<th scope="col"{numeric[h.endswith(":n")]}>{_told(h.removesuffix(":n"))}</th>' for h in heads)
+    return (f'<div class="wide" role="region" aria-label="{_plain(caption)}" tabindex="0"><table><caption>{_told(caption)}</caption>'
             f"<thead><tr>{cells}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>")  # fmt: skip
 
 
@@ -223,7 +227,7 @@ def _figures(plots: Sequence[Plot]) -> Iterator[str]:
     yield '<div class="figures">'
     for plot in plots:
         data = base64.b64encode(plot.png).decode()
-        yield (f'<figure><img alt="{_told(plot.title)}, diagram" width="{plot.width_px}" height="{plot.height_px}" '
+        yield (f'<figure><img alt="{_plain(plot.title)}, diagram" width="{plot.width_px}" height="{plot.height_px}" '
                f'src="data:image/png;base64,{data}"><figcaption>{_told(plot.caption)}</figcaption></figure>')  # fmt: skip
     yield "</div>"
 
@@ -266,5 +270,5 @@ def _computed(_: Calibration) -> Iterator[str]:
 
 def _json(calibration: Calibration) -> Iterator[str]:
     whole = json.dumps(calibration.to_json(), indent=1, ensure_ascii=False)
-    yield ('<section class="screen"><h2>Everything</h2><details><summary>The calibration file, as JSON</summary><pre role="region" aria-label="JSON" tabindex="0">'
-           f"{escape(whole)}</pre></details></section>")  # fmt: skip
+    yield '<section class="screen"><h2>Everything</h2><details><summary>The calibration file, as JSON</summary>'
+    yield f'<pre role="region" aria-label="JSON" tabindex="0">{escape(whole)}</pre></details></section>'
