@@ -23,6 +23,10 @@ from .geometry import Pose, rotation_from_vector
 from .lenses import LENSES
 
 
+CONVERGED = 1e-7
+"""Relative change of the sum of squares at which a solution stands: a thousandth of what one unknown is worth."""
+
+
 @dataclass(frozen=True)
 class LensModel:
     """Which coefficients of which lens are free.
@@ -481,7 +485,7 @@ def adjust(problem: Problem, start: State, iterations: int = 60) -> Adjusted:
     for _ in range(iterations):
         normal = _normal(problem, state)
         state, new, damping, moved = _descend(problem, state, cost, normal, damping)
-        done = moved and cost - new <= 1e-9 * new and damping < 1e-2
+        done = moved and cost - new <= CONVERGED * new and damping < 1e-2
         cost = new
         if done or not moved:
             break

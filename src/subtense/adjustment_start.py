@@ -73,9 +73,9 @@ def _start_of(problem: Problem, camera: int) -> Array:
     model = problem.models[camera]
     sights = [s for s in problem.sights if s.camera == camera]
     best: tuple[float, Array] | None = None
-    for f in max(width, height) * np.geomspace(0.25, 12, 24):
+    for f in max(width, height) * np.geomspace(0.25, 12, 18):
         theta = np.concatenate([[f, 1.0, (width - 1) / 2, (height - 1) / 2], np.zeros(model.count)])
-        cost = float(np.median([_pose_of(problem, s, theta, model.lens)[1] for s in sights[:: 1 + len(sights) // 8]]))
+        cost = float(np.median([_pose_of(problem, s, theta, model.lens)[1] for s in sights[:: 1 + len(sights) // 6]]))
         if np.isfinite(cost) and (best is None or cost < best[0]):
             best = (cost, theta)
     if best is None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .adjustment import LENS_MODELS, Adjusted, LensModel, Problem, State, adjust, inverse, reduced
+from .adjustment import LENS_MODELS, RATIONAL, Adjusted, LensModel, Problem, State, adjust, inverse, reduced
 from .arrays import Array, Indices
 from .errors import GeometryError
 
@@ -111,7 +111,7 @@ def _better(solution: Adjusted, problem: Problem, start: State) -> tuple[Adjuste
 
 def _starts(problem: Problem, start: State) -> tuple[State, ...]:
     """The start, and for a rational lens one without distortion: its solutions lie in valleys that don't lead to each other."""
-    if not any(m.count >= 8 for m in problem.models):
+    if not any(set(RATIONAL) <= set(m.free) for m in problem.models):
         return (start,)
     plain = tuple(np.concatenate([i[:4], np.zeros(i.size - 4)]) for i in start.intrinsics)
     return (start, replace(start, intrinsics=plain))
