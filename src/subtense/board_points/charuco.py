@@ -23,6 +23,8 @@ from .seen import Missing, Seen, fitted, grid_of
 
 MANY = 0.75
 """Share of the corners in the reduced picture that makes a search of the full one needless."""
+FEWEST_MARKERS = 4
+"""Markers from which it is worth asking what is wrong with them."""
 LEAST_FREE = 0.1
 """Reach of a window in squares where the markers leave less."""
 BIGGEST = (
@@ -107,8 +109,8 @@ def _fitted(gray: Pixels, board: Board, corners: Array, ids: Indices) -> Seen | 
 def _instead(gray: Pixels, board: Board, markers: int) -> Missing:
     """Likely mistakes, each tried once on the reduced picture."""
     small = reduced(gray)
-    if markers < 2:
-        return _other_dictionary(small, board)
+    if markers < FEWEST_MARKERS:
+        return _other_dictionary(small, board, markers)
     other = replace(board, legacy=not board.legacy)
     turned = replace(board, columns=board.rows, rows=board.columns)
     larger = replace(board, columns=board.columns + 1, rows=board.rows + 1)
@@ -135,7 +137,7 @@ def _is_board(small: Reduced, board: Board, corners: Array, ids: Indices) -> boo
     return lattice is not None and lattice.rms_px < 1.0
 
 
-def _other_dictionary(small: Reduced, board: Board) -> Missing:
+def _other_dictionary(small: Reduced, board: Board, markers: int) -> Missing:
     """Markers of another dictionary."""
     import cv2
 
@@ -145,10 +147,10 @@ def _other_dictionary(small: Reduced, board: Board) -> Missing:
             continue
         _, ids, _ = cv2.aruco.ArucoDetector(dictionary(name)).detectMarkers(small.pixels)
         count = 0 if ids is None else len(np.unique(ids))
-        if count >= 4:
+        if count >= FEWEST_MARKERS:
             fitting = _smallest(name, int(np.max(ids)))
-            return Missing(0, f"{count} markers of {fitting} are there; give --dictionary {fitting}")
-    return Missing(0)
+            return Missing(markers, f"{count} markers of {fitting} are there; give --dictionary {fitting}")
+    return Missing(markers)
 
 
 def _smallest(name: str, number: int) -> str:

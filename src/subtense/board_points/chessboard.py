@@ -19,7 +19,7 @@ import numpy as np
 
 from ..arrays import Array, Bools, Pixels
 from ..board import Board
-from .gray import Reduced, reduced, steps
+from .gray import TWO_STEPS, Reduced, reduced, steps
 from .lattice import Lattice, fit
 from .saddles import refined, windows_px
 from .seen import Missing, Seen, fitted
@@ -48,9 +48,9 @@ WORST_FIT = 0.1
 def chessboard(gray: Pixels, board: Board) -> Seen | Missing:
     """All inner corners of a chessboard, but for the few that are hidden."""
     found = 0
-    for small in steps(gray):
+    for i, small in enumerate(steps(gray, TWO_STEPS)):
         views: list[tuple[float, Seen]] = []
-        for corners, source in _detected(small, board):
+        for corners, source in _detected(small, board, thorough=i == 0):
             exact = source != CLASSICAL and small.scale_x == 1
             judged = _judged(gray, board, small.full(corners), source, exact)
             if isinstance(judged, Missing):
@@ -64,16 +64,20 @@ def chessboard(gray: Pixels, board: Board) -> Seen | Missing:
     return _instead(gray, board, found)
 
 
-def _detected(small: Reduced, board: Board) -> Iterator[tuple[Array, str]]:
-    """Corners by each detector, the quickest first; taken only as far as they are asked for."""
+def _detected(small: Reduced, board: Board, *, thorough: bool) -> Iterator[tuple[Array, str]]:
+    """Corners by each detector, the quickest first; taken only as far as they are asked for.
+
+    Not thorough is the sectors' quick search alone: in a large picture without a board the others take many seconds.
+    """
     import cv2
 
     size = (board.points_across, board.points_down)
-    classical = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-    found, corners = cv2.findChessboardCorners(small.pixels, size, flags=classical)
-    if found:
-        yield np.reshape(corners, (-1, 2)).astype(float), CLASSICAL
-    for flags in (0, cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY):
+    if thorough:
+        flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
+        found, corners = cv2.findChessboardCorners(small.pixels, size, flags=flags)
+        if found:
+            yield np.reshape(corners, (-1, 2)).astype(float), CLASSICAL
+    for flags in (0, cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY)[: 2 if thorough else 1]:
         found, corners = cv2.findChessboardCornersSB(small.pixels, size, flags=flags)
         if found:
             yield np.reshape(corners, (-1, 2)).astype(float), SECTORS

@@ -15,14 +15,18 @@ import numpy as np
 from ..arrays import Array, Pixels
 from ..board import Board
 from ..subpixel import CURVE
-from .gray import Reduced, steps
+from .gray import TWO_STEPS, Reduced, steps
 from .lattice import Lattice, fit
 from .seen import Missing, Seen, fitted, grid_of
 
 REACH = 0.68
 """How far around a centre the picture is looked at, in steps; the next disc's centre is 1.41 away."""
+BEYOND, BLUR_PX = 1.3, 3.0
+"""Reach once the radius is known: so many radii and pixels; there may be print beside the outer discs."""
 SMALLEST, LARGEST = 0.08, 0.62
 """Radii in steps that can be measured."""
+SHARES = (1.0, 1.3, 2.0)
+"""How many spots are looked through, over the discs of the board."""
 SHIFT_DOUBT = 0.05
 """Relative doubt of the perspective's shift: the radius, and the lens within a disc."""
 LEAST_SHARE = 0.7
@@ -35,7 +39,7 @@ _ANGLES = np.linspace(0, 2 * np.pi, 72, endpoint=False)
 def circles(gray: Pixels, board: Board) -> Seen | Missing:
     """The discs' centres, as the perspective shows them."""
     found = 0
-    for small in steps(gray):
+    for small in steps(gray, TWO_STEPS):
         for centres in _detected(small, board):
             seen = _located(gray, board, small.full(centres))
             if seen is not None:
@@ -45,25 +49,54 @@ def circles(gray: Pixels, board: Board) -> Seen | Missing:
 
 
 def _detected(small: Reduced, board: Board) -> Iterator[Array]:
+    """Grids among the dark spots that stand out most: a search through all spots of a lively background takes minutes."""
     import cv2
 
     size = (board.columns, board.rows)
-    for flags in (cv2.CALIB_CB_ASYMMETRIC_GRID, cv2.CALIB_CB_ASYMMETRIC_GRID | cv2.CALIB_CB_CLUSTERING):
-        found, centres = cv2.findCirclesGrid(small.pixels, size, flags=flags, blobDetector=_blobs(small.pixels))
-        if found:
-            yield np.reshape(centres, (-1, 2)).astype(float)
+    spots = _spots(small.pixels)
+    for share in SHARES:
+        most = round(share * board.columns * board.rows)
+        picture = _drawn(spots[:most], small.pixels.shape)
+        for flags in (cv2.CALIB_CB_ASYMMETRIC_GRID, cv2.CALIB_CB_ASYMMETRIC_GRID | cv2.CALIB_CB_CLUSTERING):
+            found, centres = cv2.findCirclesGrid(picture, size, flags=flags, blobDetector=_blobs(picture, 0.6))
+            if found:
+                yield np.reshape(centres, (-1, 2)).astype(float)
+        if most >= len(spots):
+            break
 
 
-def _blobs(gray: Pixels) -> Any:
+def _spots(gray: Pixels) -> Array:
+    """(n, 3) x, y, radius of dark spots, the one that stands out most from what is around it first."""
+    found = [(*point.pt, point.size / 2) for point in _blobs(gray, 0.9).detect(gray)]
+    spots = np.array(found, float).reshape(-1, 3)
+    around = spots[:, None, :2] + 1.5 * spots[:, None, 2:] * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+    around = np.clip(np.rint(around), 0, np.array(gray.shape[::-1]) - 1).astype(int)
+    at = np.clip(np.rint(spots[:, :2]), 0, np.array(gray.shape[::-1]) - 1).astype(int)
+    ring = np.percentile(gray[around[..., 1], around[..., 0]], 30, axis=1) if len(spots) else np.zeros(0)
+    return spots[np.argsort(gray[at[:, 1], at[:, 0]] - ring)]
+
+
+def _drawn(spots: Array, shape: tuple[int, ...]) -> Pixels:
+    """A clean picture of spots, to look for the grid in."""
+    import cv2
+
+    picture = np.full(shape, 255, np.uint8)
+    for x, y, radius in spots:
+        centre = (round(x * 256), round(y * 256))
+        cv2.circle(picture, centre, round(max(0.6 * radius, 2.5) * 256), 0, -1, cv2.LINE_AA, 8)
+    return picture
+
+
+def _blobs(gray: Pixels, convexity: float) -> Any:
     """A detector of dark spots from 5 px across to a tenth of the picture."""
     import cv2
 
     parameters = cv2.SimpleBlobDetector.Params()
-    parameters.minArea, parameters.maxArea = 20.0, gray.size / 100
+    parameters.minArea, parameters.maxArea = 16.0, gray.size / 100
     parameters.minThreshold, parameters.maxThreshold = 20.0, 240.0
     parameters.minDistBetweenBlobs = 5.0
     parameters.minInertiaRatio = 0.05  # a disc seen at 70 degrees is three times as long as wide
-    parameters.minConvexity = 0.9
+    parameters.minConvexity = convexity
     return cv2.SimpleBlobDetector.create(parameters)
 
 
@@ -74,13 +107,15 @@ def _located(gray: Pixels, board: Board, centres: Array) -> Seen | None:
     if ordered is None:
         return None
     lattice, points = ordered
-    shift, measured = np.zeros_like(grid), points
+    shift, measured, reach = np.zeros_like(grid), points, REACH
     for _ in range(3):  # where the discs are tells their shift, and the shift where they are
-        measured, radii = _centroids(gray, lattice, grid)
-        radius = float(np.nanmedian(radii))
+        measured, radii = _centroids(gray, lattice, grid, reach)
         there = np.isfinite(measured).all(axis=1)
+        radius = float(np.median(radii[there])) if there.any() else 0.0
         if not SMALLEST < radius < LARGEST or there.sum() < LEAST_SHARE * len(grid):
             return None
+        step_px = float(np.sqrt(abs(np.linalg.det(lattice.jacobian(grid.mean(axis=0)[None], 1.0)[0]))))
+        reach = min(REACH, BEYOND * radius + BLUR_PX / step_px)
         shift = _shifts(lattice, grid, radius)
         again = fit(grid[there], (measured - shift)[there], width, height)
         if again is None:
@@ -114,24 +149,24 @@ def _ordered(board: Board, centres: Array, size_px: tuple[int, int]) -> tuple[La
     return None if best is None else best[1:]
 
 
-def _centroids(gray: Pixels, lattice: Lattice, grid: Array) -> tuple[Array, Array]:
+def _centroids(gray: Pixels, lattice: Lattice, grid: Array, reach: float) -> tuple[Array, Array]:
     """(N, 2) centroids of darkness near each board point, NaN where there is no disc, and (N,) radii in steps."""
-    centres, jacobians = lattice.project(grid), lattice.jacobian(grid, REACH)
-    found = [_centroid(gray, c, j) for c, j in zip(centres, jacobians, strict=True)]
+    centres, jacobians = lattice.project(grid), lattice.jacobian(grid, reach)
+    found = [_centroid(gray, c, j, reach) for c, j in zip(centres, jacobians, strict=True)]
     return np.array([f[:2] for f in found]), np.array([f[2] for f in found])
 
 
-def _centroid(gray: Pixels, centre: Array, jac: Array) -> tuple[float, float, float]:
+def _centroid(gray: Pixels, centre: Array, jac: Array, reach: float) -> tuple[float, float, float]:
     nothing = (np.nan, np.nan, np.nan)
-    reach = REACH * np.hypot(jac[:, 0], jac[:, 1])
-    low, high = np.floor(centre - reach).astype(int), np.ceil(centre + reach).astype(int) + 1
+    reach_px = reach * np.hypot(jac[:, 0], jac[:, 1])
+    low, high = np.floor(centre - reach_px).astype(int), np.ceil(centre + reach_px).astype(int) + 1
     if np.any(low < 0) or np.any(high > gray.shape[::-1]) or np.linalg.det(jac) == 0:
         return nothing
     y, x = np.mgrid[low[1] : high[1], low[0] : high[0]]
     away = np.stack([x - centre[0], y - centre[1]], axis=-1)
     distance = np.hypot(*np.moveaxis(away @ np.linalg.inv(jac).T, -1, 0))
     light = (gray[low[1] : high[1], low[0] : high[0]] / 255.0) ** CURVE
-    rim, core = (distance > 0.88 * REACH) & (distance < REACH), distance < 0.1
+    rim, core = (distance > 0.88 * reach) & (distance < reach), distance < 0.1
     if rim.sum() < 12 or not core.any():
         return nothing
     plane = np.linalg.lstsq(np.column_stack([away[rim], np.ones(rim.sum())]), light[rim], rcond=None)[0]
@@ -139,7 +174,7 @@ def _centroid(gray: Pixels, centre: Array, jac: Array) -> tuple[float, float, fl
     depth = float(np.mean((ground - light)[core]))
     if not depth > 0.02:
         return nothing
-    dark = np.where(distance < REACH, (ground - light) / depth, 0.0)
+    dark = np.where(distance < reach, (ground - light) / depth, 0.0)
     area = float(dark.sum())
     if area <= 0:
         return nothing

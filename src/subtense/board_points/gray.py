@@ -10,6 +10,8 @@ from ..arrays import Array, Pixels
 
 FINDING_PX = 1280
 """Longest side of the picture that boards are searched in first."""
+TWO_STEPS = 2
+"""Where the full picture would show no more: what is found in it is larger than a few pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +52,8 @@ def reduced(gray: Pixels, longest_px: int = FINDING_PX) -> Reduced:
     return Reduced(np.asarray(cv2.resize(gray, size, interpolation=cv2.INTER_AREA)), size[0] / width, size[1] / height)
 
 
-def steps(gray: Pixels) -> tuple[Reduced, ...]:
-    """Pictures to search one after the other: the reduced one, then one of twice that, then the full one."""
+def steps(gray: Pixels, most: int = 3) -> tuple[Reduced, ...]:
+    """Pictures to search one after the other, `most` of them: the reduced one, then one of twice that, then the full one."""
     full_px = max(gray.shape)
     sides = [side for side in (FINDING_PX, 2 * FINDING_PX) if side < 0.8 * full_px]
-    return tuple(reduced(gray, side) for side in (*sides, full_px))
+    return tuple(reduced(gray, side) for side in (*sides, full_px)[:most])

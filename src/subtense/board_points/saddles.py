@@ -47,8 +47,9 @@ def refined(gray: Pixels, points_px: Array, half_px: Indices) -> Array:
 
     out = np.full((len(points_px), 2), np.nan)
     height, width = gray.shape
-    half_px = np.minimum(half_px, max((min(height, width) - 6) // 2, 1))
-    inside = np.all((points_px >= 1) & (points_px <= [width - 2, height - 2]), axis=1)
+    border = np.minimum(points_px, np.array([width - 1, height - 1]) - points_px).min(axis=1)
+    half_px = np.minimum(half_px, np.floor(border).astype(int) - 1)  # what is made up beyond the border pulls
+    inside = half_px >= SMALLEST_PX
     ending = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 60, 1e-3)
     for half in np.unique(half_px[inside]):
         these = inside & (half_px == half)
