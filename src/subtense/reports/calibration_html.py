@@ -73,7 +73,8 @@ figcaption { font-size: .9rem; margin-top: .5rem; }
 details summary { cursor: pointer; color: var(--accent); font-weight: 700; }
 pre { overflow-x: auto; background: var(--card); padding: .8rem; font-size: .8rem; max-height: 40rem; }
 main { padding-bottom: 3rem; }
-@media (max-width: 40rem) { dl { grid-template-columns: 1fr; } dd { margin-bottom: .4rem; } }
+@media (max-width: 40rem) { tbody th { min-width: 5.5rem; } .words { min-width: 11rem; }
+  dl { grid-template-columns: 1fr; } dd { margin-bottom: .4rem; } }
 @page { size: A4; margin: 15mm; }
 @media print {
   :root { color-scheme: light; --paper: #fff; --card: #f4f6f8; --ink: #1c1c1c; --quiet: #4f5963; --rule: #c3cad0;
@@ -209,11 +210,10 @@ def _checks(calibration: Calibration) -> Iterator[str]:
     rows = []
     for check in sorted(calibration.checks, key=lambda c: c.passed):
         word = "passed" if check.passed else "failed"
-        cells = (check.found, "" if check.passed else check.cure)[: 2 if failed else 1]
-        told = "".join(f'<td class="words">{_told(cell)}</td>' for cell in cells)
-        rows.append(f'<tr><td class="{word}">{word}</td><th scope="row">{_told(check.name)}</th>{told}</tr>')
-    caption = f"{len(calibration.checks)} checks, {failed or 'none'} failed"
-    yield _table(caption, ("result", "what", "found", *(("cure",) if failed else ())), rows)
+        cure = "" if check.passed or not check.cure else f"<br><strong>Cure:</strong> {_told(check.cure)}"
+        rows.append(f'<tr><td class="{word}">{word}</td><th scope="row">{_told(check.name)}</th>'
+                    f'<td class="words">{_told(check.found)}{cure}</td></tr>')  # fmt: skip
+    yield _table(f"{len(calibration.checks)} checks, {failed or 'none'} failed", ("result", "what", "found"), rows)
 
 
 # -- pictures ----------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -29,10 +29,9 @@ from ..errors import InputError, MissingExtraError
 from ..plot import Plot
 from ..whole_file import write_whole
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
+Figure = Any
+"""Matplotlib's, which is imported only where a picture is drawn."""
+Axes = Any
 DPI, WIDTH_IN = 150, 8.0
 BLUE, ORANGE, GREEN, VERMILLION, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7"
 """Of Okabe and Ito, told apart by people who see fewer colours."""
@@ -93,11 +92,11 @@ def png_files(calibration: Calibration, folder: Path) -> tuple[Path, ...]:
         InputError: the folder can't be made or written to.
         MissingExtraError: matplotlib is not installed.
     """
-    drawn = plots(calibration)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError("--plots", str(folder), f"the folder can't be made ({error.strerror or error})") from None
+    drawn = plots(calibration)
     paths = tuple(folder / f"{plot.name}.png" for plot in drawn)
     for plot, path in zip(drawn, paths, strict=True):
         write_whole(path, plot.png, "--plots")
@@ -131,9 +130,9 @@ def _finished(figure: Figure, name: str, title: str, caption: str) -> Plot:
 
 
 def _figure(height_in: float, panels: int = 1) -> tuple[Figure, Sequence[Axes]]:
-    from matplotlib.figure import Figure
+    from matplotlib import figure as drawing
 
-    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    figure = drawing.Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
     return figure, np.atleast_1d(figure.subplots(panels, 1, sharex=panels > 1)).tolist()
 
 
