@@ -39,6 +39,17 @@ COVERAGE = 0.6
 FEW_VIEWS = 8
 
 
+def _stands_out(gain: float, noise: float, dof: int) -> bool:
+    """Whether a bow is more than noise that is not independent would make: if not it is doubt, and the value stays as it is.
+
+    How much larger the noise is than residuals say was itself learnt from `dof` differences only, hence the F law.
+    """
+    from scipy.stats import chi2
+    from scipy.stats import f as fisher
+
+    return bool((chi2.sf(gain, 2) if noise == 1 else fisher.sf(gain / noise**2 / 2, 2, dof)) < LEVEL)
+
+
 @dataclass(frozen=True)
 class Check:
     """One question to a calibration, and its answer.
@@ -71,11 +82,8 @@ def widened(solution: Adjusted, checks: Sequence[Check]) -> Adjusted:
 
     Common directions of residuals and halves that disagree are two views of noise that is not independent: the larger counts.
     """
-    from scipy.stats import chi2
-
     noise = max(c.noise_factor for c in checks)
-    # a bow that is no more than such noise would make is doubt, not knowledge: the value then stays as it is
-    sure = [c.better for c in checks if c.better is not None and chi2.sf(c.gain / noise**2, 2) < LEVEL]
+    sure = [c.better for c in checks if c.better is not None and _stands_out(c.gain, noise, solution.problem.free.size)]
     best = sure[0] if sure else solution
     cov = best.cov * noise**2
     return replace(best, cov=cov + sum((c.extra_cov for c in checks if c.extra_cov is not None), np.zeros_like(cov)))

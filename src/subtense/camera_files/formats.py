@@ -13,6 +13,7 @@ import numpy as np
 from ..camera import Camera
 from ..errors import FileFormatError, InputError
 from ..lenses import LENSES
+from ..quantity import Note
 from . import (
     colmap,
     flow_text,
@@ -127,8 +128,7 @@ def read(path: object, content: bytes, pick: Pick = NOTHING, form: str | None = 
         found = row.read(Reading(path, tree, pick))
         if pick.fisheye and found.camera.lens != "fisheye":
             raise FileFormatError(path, "says itself that its lens is no fisheye; leave out #fisheye")
-        _check_invertible(path, found.camera)
-    return found
+        return _checked_lens(path, found)
 
 
 def _row_and_tree(path: object, content: bytes, form: str | None) -> tuple[Format, Any]:
@@ -186,23 +186,27 @@ def _known(form: str, option: str) -> str:
 # -- whether the lens can be used ----------------------------------------------------------------------
 
 
-def _check_invertible(path: object, camera: Camera) -> None:
-    """That each pixel has one direction, and that direction that pixel.
+def _checked_lens(path: object, found: Found) -> Found:
+    """That pixels have one direction, and that direction that pixel: a lens that turns back inside of the picture is refused.
 
-    Over the whole picture; of a fisheye over the largest circle about the principal point that the picture holds, as its
-    corners may lie outside of what the lens draws (points there are refused one by one).
+    What it does in the corners, outside of the circle that the picture's shorter side holds, is noted: points there are refused
+    one by one, and the others are right.
     """
+    camera = found.camera
     points = _probes(camera)
     again = camera.project(camera.rays(points))
     lost = ~(np.hypot(*(again - points).T) < 1e-3)
     if not lost.any():
-        return
+        return found
     radius = np.hypot(*(points[lost] - [camera.cx_px, camera.cy_px]).T).min()
-    raise FileFormatError(
-        path,
-        f"its lens distortion turns back {radius:.0f} px from the principal point, inside of the picture, so that pixels "
-        "there have no direction of their own; calibrate again with points out to the corners",
-    )
+    turns = f"its lens distortion turns back {radius:.0f} px from the principal point"
+    cure = "calibrate again with points out to the corners"
+    if radius < min(camera.width_px, camera.height_px) / 2:
+        raise FileFormatError(
+            path, f"{turns}, inside of the picture, so that pixels there have no direction of their own; {cure}"
+        )
+    text = f"the camera's {turns[4:]}: points farther out have no direction and are refused"
+    return replace(found, notes=(*found.notes, Note("distortion_folds", text, cure)))
 
 
 def _probes(camera: Camera) -> Any:

@@ -17,6 +17,7 @@ from ..board import Board, BoardView
 from ..calibration import Calibration, Picture, doubts
 from ..calibration_checks import checks_of, ranges_m, tilts_rad, warp_check, widened
 from ..calibration_maps import next_picture
+from ..camera import Camera
 from ..errors import FileFormatError, GeometryError, InputError, NothingFoundError
 from ..geometry import Pose
 from ..quantity import Note, Quantity
@@ -25,6 +26,9 @@ from ..rig import Rig
 AUTOMATIC = ("opencv4", "opencv5", "opencv8", "fisheye")
 """The models that are tried where none is given, leanest first."""
 LEAST_PICTURES = 3
+NO_BETTER = 0.06
+"""A richer model must foretell the squares of residuals by more than that share better (3 % of their rms): what it gains in
+the middle it pays for where it is extrapolated."""
 ASSUMED_SCALE = 0.005
 """Relative u of a board's lengths where nobody measured the print (TRAPS of print scale: 97 % is common)."""
 OUTLIER = 6.0
@@ -273,8 +277,10 @@ def chosen_model(
     fitted: dict[str, Adjusted] = {}
     for name in names:
         try:
-            fitted[name] = _with_model(solution, LENS_MODELS[name])
-            errors[name] = _foretold(fitted[name], folds)
+            tried = _with_model(solution, LENS_MODELS[name])
+            if _turns_back(tried.camera()):
+                continue
+            fitted[name], errors[name] = tried, _foretold(tried, folds)
         except GeometryError:
             continue
     if not errors:
@@ -283,10 +289,16 @@ def chosen_model(
     best = min(means, key=lambda name: means[name])
     for name in errors:
         more = errors[name] - errors[best]
-        if np.mean(more) <= np.std(more) / np.sqrt(more.size):
+        if np.mean(more) <= max(np.std(more) / np.sqrt(more.size), NO_BETTER * means[best]):
             best = name
             break
     return fitted[best], {name: float(np.sqrt(2 * m)) for name, m in means.items()}
+
+
+def _turns_back(camera: Camera) -> bool:
+    """Whether a lens, no fisheye, has no direction for some pixels of the picture: it is then extrapolated beyond sense."""
+    x, y = np.meshgrid(np.linspace(0, camera.width_px - 1, 17), np.linspace(0, camera.height_px - 1, 17))
+    return bool(not camera.invertible(np.column_stack([x.ravel(), y.ravel()])).all()) and camera.lens != "fisheye"
 
 
 def _chosen_flat(solution: Adjusted) -> tuple[Adjusted, dict[str, float]]:
