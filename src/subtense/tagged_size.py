@@ -85,10 +85,8 @@ def tagged_size(photo: Photo) -> TaggedSize:
     return found
 
 
-def _noted(found: TaggedSize, code: str, text: str, cure: str, relative_u: float = 0.0) -> TaggedSize:
-    return replace(
-        found, notes=(*found.notes, Note(code, text, cure)), relative_u=math.hypot(found.relative_u, relative_u)
-    )
+def _noted(found: TaggedSize, note: Note, relative_u: float = 0.0) -> TaggedSize:
+    return replace(found, notes=(*found.notes, note), relative_u=math.hypot(found.relative_u, relative_u))
 
 
 def _zoomed(photo: Photo, found: TaggedSize) -> TaggedSize:
@@ -96,7 +94,9 @@ def _zoomed(photo: Photo, found: TaggedSize) -> TaggedSize:
     if not zoom or not 1.01 < zoom < 100:
         return found
     text = f"taken with a digital zoom of {zoom:g}; the focal length is corrected by it where its tag does not hold it"
-    return _noted(replace(found, zoom=zoom), "digital_zoom", text, "take the picture without digital zoom", ZOOMED_U)
+    return _noted(
+        replace(found, zoom=zoom), Note("digital_zoom", text, "take the picture without digital zoom"), ZOOMED_U
+    )
 
 
 def _film(photo: Photo, found: TaggedSize) -> TaggedSize:
@@ -108,7 +108,7 @@ def _film(photo: Photo, found: TaggedSize) -> TaggedSize:
     text = (f"the picture has the size of a film and no mark of a still; a film's frame is {low:g} to {high:g} times narrower "
             "than a still, which is in u")  # fmt: skip
     u = (high - low) / math.sqrt(12) / middle
-    return _noted(replace(found, film=middle), "video_crop", text, "calibrate the camera in this film mode", u)
+    return _noted(replace(found, film=middle), Note("video_crop", text, "calibrate the camera in this film mode"), u)
 
 
 _MILLIMETRES = re.compile(r"(\d+(?:\.\d+)?)\s?mm")
@@ -125,7 +125,7 @@ def _lens(photo: Photo, found: TaggedSize) -> TaggedSize:
         return found
     text = (f"the lens is called {tags.lens!r}, and the focal length is {tags.focal_mm:g} mm: the tags are of two lenses of "
             "this phone")  # fmt: skip
-    return _noted(found, "lens_ambiguous", text, "give the camera with --camera", min(min(gaps), 1.0))
+    return _noted(found, Note("lens_ambiguous", text, "give the camera with --camera"), min(min(gaps), 1.0))
 
 
 # -- resized and cropped -----------------------------------------------------------------------------------
@@ -144,7 +144,7 @@ def _cut(photo: Photo, found: TaggedSize) -> TaggedSize:
 
 def _by_unknown(found: TaggedSize, text: str) -> TaggedSize:
     wider = replace(found, centre_u=CROPPED_CENTRE)
-    return _noted(wider, "cropped", text, "use the original picture", CROPPED_U)
+    return _noted(wider, Note("cropped", text, "use the original picture"), CROPPED_U)
 
 
 def _rectangle(tags: Metadata) -> tuple[float, float, float, float, float] | None:
@@ -179,7 +179,7 @@ def _by_rectangle(found: TaggedSize, rectangle: tuple[float, float, float, float
     text = (f"the picture was cropped to {100 * across:.0f} % of the width and {100 * down:.0f} % of the height of "
             f"{round(whole[0])} x {round(whole[1])} px; the camera is corrected by it")  # fmt: skip
     placed = replace(found, whole_px=whole, middle_px=middle, centre_u=math.hypot(unsure, 0.5 * tilt))
-    return _noted(placed, "cropped", text, "use the original picture", tilt)
+    return _noted(placed, Note("cropped", text, "use the original picture"), tilt)
 
 
 def _usual(size: Pair) -> bool:
@@ -200,7 +200,7 @@ def _by_size(photo: Photo, found: TaggedSize) -> TaggedSize:
     sizes = f"taken with {then[0]} x {then[1]} px, now {now[0]} x {now[1]} px"
     if abs(sx / sy - 1) < 0.01:
         text = f"the picture was resized ({sizes}); the focal length is scaled with it"
-        return _noted(replace(found, scale=sx), "resized", text, "use the original picture")
+        return _noted(replace(found, scale=sx), Note("resized", text, "use the original picture"))
     # the whole picture, scaled, holds this one: between cut in one direction only and cut without being resized
     least = max(sx, sy)
     scale = (least + 1) / 2 if least < 1 else least

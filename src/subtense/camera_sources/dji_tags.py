@@ -47,7 +47,7 @@ def camera(photo: Photo) -> Hypothesis:
         return Hypothesis(NAME, found, text, size.notes)
     design = positive(xmp.get("drone-dji:CalibratedFocalLength"))
     if design is None:
-        return Hypothesis(NAME, None, "the metadata has no calibration by DJI")
+        return Hypothesis(NAME, None, "no calibration by DJI")
     text = f"DJI: the design's focal length of {design:g} px"
     made = told_camera(photo, design * scale * size.zoom, DESIGN_U, text, size)
     return Hypothesis(NAME, made, text, size.notes)

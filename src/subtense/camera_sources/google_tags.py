@@ -35,7 +35,7 @@ def camera(photo: Photo) -> Hypothesis:
     names = ("FocalLengthX", "FocalLengthY", "ImageWidth", "ImageHeight")
     fx, fy, width, height = (positive(xmp.get(f"ImagingModel:{name}")) for name in names)
     if fx is None or fy is None or width is None or height is None:
-        return Hypothesis(NAME, None, "the metadata has no imaging model of Google's")
+        return Hypothesis(NAME, None, "no imaging model by Google")
     now = photo.stored_size_px
     if abs(now[0] / now[1] / (width / height) - 1) > 0.02:
         text = f"Google's imaging model is for {width:g} x {height:g} px, of other proportions than the picture's"

@@ -29,7 +29,7 @@ def camera(photo: Photo) -> Hypothesis:
     """The hypothesis, or its reason."""
     matrix = photo.metadata.intrinsic_matrix
     if matrix is None:
-        return Hypothesis(NAME, None, "the file has no camera matrix")
+        return Hypothesis(NAME, None, "no camera matrix")
     fx, _, cx, _, fy, cy = matrix[:6]
     width, height = photo.width_px, photo.height_px
     diagonal = math.hypot(width, height)

@@ -28,7 +28,7 @@ def camera(photo: Photo) -> Hypothesis:
     """The hypothesis, or its reason."""
     tags = photo.metadata
     if not is_panorama(tags):
-        return Hypothesis(NAME, None, "the metadata has no panorama")
+        return Hypothesis(NAME, None, "no panorama")
     note = refusal(photo)
     notes = (note,) if note else ()
     geometry = _geometry(photo)

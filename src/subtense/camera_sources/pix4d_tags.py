@@ -40,7 +40,7 @@ def camera(photo: Photo) -> Hypothesis:
     size = tagged_size(photo)
     point = _numbers(xmp.get("Camera:PrincipalPoint", ""))
     if len(point) != 2 or min(point) <= 0:
-        return Hypothesis(NAME, None, "the metadata has no calibration in Pix4D's namespace")
+        return Hypothesis(NAME, None, "no calibration in Pix4D's namespace")
     per_mm, guessed = _per_mm(photo, size, point)
     if xmp.get("Camera:ModelType", "perspective").lower() == "fisheye":
         made = _fisheye(photo, size, point, per_mm)

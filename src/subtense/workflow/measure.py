@@ -11,6 +11,7 @@ import numpy as np
 from ..detectors.markers import FAMILIES, markers
 from ..distribution import normal_quantile
 from ..document import Document
+from ..edited import refusal
 from ..errors import FileFormatError, InputError, NothingFoundError, UnknownCameraError
 from ..method import Method
 from ..methods import known_size, pose
@@ -116,8 +117,14 @@ def measure_inputs(
 
 
 def no_camera_document(photo: Photo, why: UnknownCameraError) -> Document:
-    """A photo whose camera nothing tells, which is no failure of the one who asks: a document with a note."""
-    return Document((), None, photo.to_json(), (*photo.notes, Note(why.code, str(why))))
+    """A photo whose camera nothing tells, which is no failure of the one who asks: a document with notes."""
+    reason = refusal(photo) or (
+        Note("no_focal_length", "the metadata has neither a focal length nor its 35 mm equivalent", "give the camera")
+        if why.code == "no_focal_length"
+        else None
+    )
+    notes = (*photo.notes, *((reason,) if reason else ()), Note("unknown_camera", str(why)))
+    return Document((), None, photo.to_json(), notes)
 
 
 def camera_document(photo: Photo, given_camera: str | Resolved | None = None, *, level: float = 0.95) -> Document:
