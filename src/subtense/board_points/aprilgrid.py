@@ -10,6 +10,8 @@ Source: https://github.com/ethz-asl/kalibr/wiki/calibration-targets
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays import Array, Indices, Pixels
@@ -17,7 +19,7 @@ from ..board import Board
 from ..errors import InputError
 from ..subpixel import refine_quad
 from .dictionaries import dictionary, modules_of, size_of
-from .gray import Reduced, steps
+from .gray import Reduced, reduced, steps
 from .lattice import Lattice, fit_without_strays
 from .saddles import refined, windows_px
 from .seen import Missing, Seen, fitted, grid_of
@@ -25,6 +27,8 @@ from .seen import Missing, Seen, fitted, grid_of
 BORDER_MODULES = (2, 1)
 """Widths of the black border that are read; Kalibr's first."""
 FEWEST_TAGS = 3
+MOST_COLUMNS = 20
+"""Columns up to which a wrong count is looked for."""
 MANY = 0.75
 """Share of the tags in the reduced picture that makes a search of the full one needless."""
 WORST_FIT = 0.05
@@ -53,15 +57,25 @@ def aprilgrid(gray: Pixels, board: Board) -> Seen | Missing:
             best = seen
         if best is not None and len(best.ids) >= MANY * len(board.points_m):
             break
-    return best if best is not None else Missing(most, _why(board, most))
+    return best if best is not None else _instead(board, reduced(gray), most, gray.shape[::-1])
 
 
-def _why(board: Board, most: int) -> str:
-    return (
-        f"{most} tags of {board.dictionary} are there, but not as on this board; check --squares"
-        if most >= FEWEST_TAGS
-        else ""
-    )
+def _instead(board: Board, small: Reduced, most: int, size_px: tuple[int, int]) -> Missing:
+    """On how many columns the tags lie as seen, if it is not as many as stated."""
+    numbers, quads, _ = _detected(small, replace(board, columns=MOST_COLUMNS, rows=MOST_COLUMNS))
+    if len(numbers) < FEWEST_TAGS:
+        return Missing(most)
+    best: tuple[float, str] | None = None
+    for columns in range(2, MOST_COLUMNS + 1):
+        rows = max(int(numbers.max()) // columns + 1, 2)
+        placed = _placed(replace(board, columns=columns, rows=rows), numbers, quads, size_px)
+        if placed is not None and (best is None or placed[0].rms_px < best[0]):
+            best = placed[0].rms_px, f"{columns}x{rows}"
+    if best is None:
+        return Missing(
+            most, f"{len(numbers)} tags of {board.dictionary} are there, but not as on such a board; check --squares"
+        )
+    return Missing(most, f"a board of {best[1]} tags is there; give --squares {best[1]}")
 
 
 def _detected(small: Reduced, board: Board) -> tuple[Indices, Array, int]:

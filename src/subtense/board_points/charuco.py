@@ -7,7 +7,6 @@ or the other.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +14,9 @@ import numpy as np
 from ..arrays import Array, Indices, Pixels
 from ..board import Board
 from ..errors import InputError
-from .dictionaries import NAMES, dictionary, dictionary_name, size_of
+from .dictionaries import NAMES, SIZES, dictionary, dictionary_name, size_of
 from .gray import Reduced, reduced, steps
-from .lattice import FEWEST, fit
+from .lattice import fit
 from .saddles import refined, windows_px
 from .seen import Missing, Seen, fitted, grid_of
 
@@ -25,6 +24,12 @@ MANY = 0.75
 """Share of the corners in the reduced picture that makes a search of the full one needless."""
 FEWEST_MARKERS = 4
 """Markers from which it is worth asking what is wrong with them."""
+SMALLEST_PERIMETER = 0.01
+"""Of a marker, over the picture's longest side: small boards in large pictures."""
+MOST_COLUMNS = 41
+"""Columns up to which a wrong count is looked for."""
+WORST_FIT = 0.1
+"""Rms residual of the markers over a square's side beyond which they lie otherwise."""
 LEAST_FREE = 0.1
 """Reach of a window in squares where the markers leave less."""
 BIGGEST = (
@@ -81,7 +86,7 @@ def _detected(gray: Pixels, board: Board) -> tuple[Array, Indices, Indices]:
 
     detector = cv2.aruco.CharucoDetector(opencv_board(board))
     parameters = detector.getDetectorParameters()
-    parameters.minMarkerPerimeterRate = 0.01  # of the longest side: small boards in large pictures
+    parameters.minMarkerPerimeterRate = SMALLEST_PERIMETER
     detector.setDetectorParameters(parameters)
     corners, ids, _, markers = detector.detectBoard(gray)
     numbers = np.zeros(0, int) if markers is None else np.asarray(np.reshape(markers, -1), int)
@@ -107,55 +112,91 @@ def _fitted(gray: Pixels, board: Board, corners: Array, ids: Indices) -> Seen | 
 
 
 def _instead(gray: Pixels, board: Board, markers: int) -> Missing:
-    """Likely mistakes, each tried once on the reduced picture."""
+    """Likely mistakes, looked for in the reduced picture."""
     small = reduced(gray)
     if markers < FEWEST_MARKERS:
         return _other_dictionary(small, board, markers)
-    other = replace(board, legacy=not board.legacy)
-    turned = replace(board, columns=board.rows, rows=board.columns)
-    larger = replace(board, columns=board.columns + 1, rows=board.rows + 1)
-    size = "{0.columns}x{0.rows}".format
-    tried = [(other, f"the board is of the {'older' if other.legacy else 'newer'} pattern; "
-              f"{'give' if other.legacy else 'leave out'} --legacy"),
-             (turned, f"columns and rows are exchanged; give --squares {size(turned)}"),
-             (larger, f"a board of {size(larger)} squares is there ({size(board)} are its inner corners); "
-              f"give --squares {size(larger)}")]  # fmt: skip
-    for guess, text in tried:
-        if size_of(guess.dictionary) < guess.columns * guess.rows // 2:
-            continue
-        corners, ids, _ = _detected(small.pixels, guess)
-        if _is_board(small, guess, corners, ids):
-            return Missing(markers, text)
-    return Missing(
-        markers, f"{markers} markers of {board.dictionary} are there, but not as on this board; check --squares"
-    )
+    laid = _laid(small, board)
+    if laid is None:
+        return Missing(
+            markers, f"{markers} markers of {board.dictionary} are there, but not as on such a board; check --squares"
+        )
+    columns, rows, white_first = laid
+    size, stated = f"{columns}x{rows}", f"{board.columns}x{board.rows}"
+    if size != stated:
+        inner = (columns - 1, rows - 1) == (board.columns, board.rows)
+        why = f" ({stated} are its inner corners)" if inner else ""
+        return Missing(markers, f"a board of {size} squares is there{why}; give --squares {size}")
+    if white_first != (board.legacy and rows % 2 == 0):
+        text = "the older pattern; give --legacy" if white_first else "the newer pattern; leave out --legacy"
+        return Missing(markers, f"the board is of {text}")
+    return Missing(markers)
 
 
-def _is_board(small: Reduced, board: Board, corners: Array, ids: Indices) -> bool:
+def _laid(small: Reduced, board: Board) -> tuple[int, int, bool] | None:
+    """Columns and rows of squares on which the markers lie as seen, and whether the first square is white.
+
+    The numbers go row by row, so they tell the columns by where each row begins; the rows are those up to the last marker.
+    """
+    numbers, quads = _markers(small, board.dictionary)
     height, width = small.pixels.shape
-    lattice = fit(grid_of(board)[ids], corners, width, height) if len(ids) >= 2 * FEWEST else None
-    return lattice is not None and lattice.rms_px < 1.0
+    inset = (1 - board.marker_m / board.square_m) / 2
+    corner = np.array([[inset, inset], [1 - inset, inset], [1 - inset, 1 - inset], [inset, 1 - inset]])
+    best: tuple[float, tuple[int, int, bool]] | None = None
+    for columns in range(3, MOST_COLUMNS):
+        for white_first in (False, True):
+            place = _places(columns, white_first, int(numbers.max(initial=0)) + 1)[numbers]
+            corners = (place[:, None] + corner).reshape(-1, 2)  # not their middles: those fit many a wrong count
+            lattice = fit(corners, quads.reshape(-1, 2), width, height)
+            if lattice is None:
+                continue
+            jac = np.linalg.det(lattice.jacobian(corners.mean(axis=0)[None], 1.0)[0])
+            misfit = lattice.rms_px / np.sqrt(abs(jac))
+            if jac > 0 and misfit < WORST_FIT and (best is None or misfit < best[0]):
+                best = misfit, (columns, int(place[:, 1].max()) + 1, white_first)
+    return None if best is None else best[1]
+
+
+def _places(columns: int, white_first: bool, count: int) -> Array:
+    """(count, 2) column and row of the white squares, row by row."""
+    rows = 2 * count // columns + 2
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    white = (row + column) % 2 == (0 if white_first else 1)
+    return np.column_stack([column[white], row[white]])[:count].astype(float)
+
+
+def _markers(small: Reduced, name: str) -> tuple[Indices, Array]:
+    """Numbers (n,) and corners (n, 4, 2) of the markers of a dictionary, each number once."""
+    import cv2
+
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.minMarkerPerimeterRate = SMALLEST_PERIMETER
+    quads, numbers, _ = cv2.aruco.ArucoDetector(dictionary(name), parameters).detectMarkers(small.pixels)
+    if numbers is None:
+        return np.zeros(0, int), np.zeros((0, 4, 2))
+    once, at = np.unique(np.reshape(numbers, -1), return_index=True)
+    return np.asarray(once, int), np.reshape(quads, (-1, 4, 2)).astype(float)[at]
 
 
 def _other_dictionary(small: Reduced, board: Board, markers: int) -> Missing:
     """Markers of another dictionary."""
-    import cv2
-
-    mine = NAMES[dictionary_name(board.dictionary)]
+    mine = dictionary_name(board.dictionary)
     for name in BIGGEST:
-        if NAMES[name].split("_")[1] == mine.split("_")[1] and name[0].isdigit() and "h" not in name:
+        if _kind(name) == _kind(mine):
             continue
-        _, ids, _ = cv2.aruco.ArucoDetector(dictionary(name)).detectMarkers(small.pixels)
-        count = 0 if ids is None else len(np.unique(ids))
-        if count >= FEWEST_MARKERS:
-            fitting = _smallest(name, int(np.max(ids)))
-            return Missing(markers, f"{count} markers of {fitting} are there; give --dictionary {fitting}")
+        numbers, _ = _markers(small, name)
+        if len(numbers) >= FEWEST_MARKERS:
+            fitting = _smallest(name, int(numbers.max()))
+            return Missing(markers, f"{len(numbers)} markers of {fitting} are there; give --dictionary {fitting}")
     return Missing(markers)
+
+
+def _kind(name: str) -> str:
+    """4x4_50 and 4x4_1000 are of one kind: the smaller is the beginning of the larger."""
+    return name.partition("_")[0] if name[0].isdigit() and "x" in name else name
 
 
 def _smallest(name: str, number: int) -> str:
     """The smallest dictionary of a kind that has this marker."""
-    family, _, size = name.rpartition("_")
-    if not size.isdigit() or not family:
-        return name
-    return next(f"{family}_{n}" for n in (50, 100, 250, 1000) if number < n)
+    sizes = [f"{_kind(name)}_{size}" for size in SIZES if number < size]
+    return sizes[0] if sizes and sizes[0] in NAMES else name

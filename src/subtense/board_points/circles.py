@@ -8,6 +8,7 @@ board's own fit, through which each disc is projected as a polygon; the discs' r
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from ..arrays import Array, Pixels
 from ..board import Board
 from ..subpixel import CURVE
-from .gray import TWO_STEPS, Reduced, steps
+from .gray import TWO_STEPS, Reduced, reduced, steps
 from .lattice import Lattice, fit
 from .seen import Missing, Seen, fitted, grid_of
 
@@ -45,6 +46,16 @@ def circles(gray: Pixels, board: Board) -> Seen | Missing:
             if seen is not None:
                 return seen
             found = max(found, len(centres))
+    return _instead(gray, board, found)
+
+
+def _instead(gray: Pixels, board: Board, found: int) -> Missing:
+    """Whether columns and rows are exchanged."""
+    turned = replace(board, columns=board.rows, rows=board.columns)
+    small = reduced(gray)
+    for centres in _detected(small, turned):
+        if _located(gray, turned, small.full(centres)) is not None:
+            return Missing(found, f"columns and rows are exchanged; give --squares {turned.columns}x{turned.rows}")
     return Missing(found)
 
 

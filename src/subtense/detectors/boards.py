@@ -33,14 +33,22 @@ def board_view(photo: Photo, board: Board) -> BoardView:
     """
     seen = find_board(photo, board)
     if isinstance(seen, Missing):
-        needed = needed_points(board)
-        cure = seen.text or _CURES[board.kind]
-        many = "markers" if board.kind in ("charuco", "aprilgrid") else "points"
         raise NothingFoundError(
-            f"{photo.name}: no {board.text} is seen, {seen.found} {many} were found and {needed} points are needed; {cure}",
-            found=seen.found, needed=needed,
-        )  # fmt: skip
+            f"{photo.name}: no {board.text} is seen; {_why(seen, board)}", found=seen.found, needed=needed_points(board)
+        )
     return BoardView(photo.name, photo.width_px, photo.height_px, seen.ids, seen.points_px, seen.sigma_px, seen.source)
+
+
+def _why(missing: Missing, board: Board) -> str:
+    """What is there instead, or how much was found, and what to do."""
+    if missing.text:
+        return missing.text
+    needed, cure = needed_points(board), _CURES[board.kind]
+    if board.kind in ("charuco", "aprilgrid"):
+        return f"{missing.found} markers were found, and {needed} points are needed; {cure}"
+    if missing.found >= needed:
+        return f"what was found does not lie as on this board; {cure}"
+    return f"{missing.found} points were found, and {needed} are needed; {cure}"
 
 
 _CURES = {
