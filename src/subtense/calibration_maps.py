@@ -59,9 +59,16 @@ def uncertainty_map(camera: Camera, columns: int = 33, rows: int = 25) -> Uncert
     )
 
 
-def uncertainty_at(camera: Camera, points_px: Array) -> Array:
-    """(N,) standard deviation of where known directions are seen, px, along its worse axis; NaN where there is no direction."""
-    moves, _ = _moves(camera, points_px, None)
+def uncertainty_at(camera: Camera, points_px: Array, *, turned: bool = True) -> Array:
+    """(N,) standard deviation of where known directions are seen, px, along its worse axis; NaN where there is no direction.
+
+    Args:
+        camera: with its covariance.
+        points_px: (N, 2).
+        turned: whether the turn of the camera that fits best is taken out.
+    """
+    n = 4 + camera.coefficients.size
+    moves, _ = _moves(camera, points_px, None if turned else np.zeros((3, n)))
     each = moves @ _cov(camera) @ moves.swapaxes(-1, -2)
     good = np.isfinite(each).all((1, 2))
     u = np.full(len(points_px), np.nan)

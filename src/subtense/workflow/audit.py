@@ -62,7 +62,11 @@ def audit_views(camera: Camera, seen: Seen, board: Board) -> Audit:
         in_u = float(np.sqrt(np.nanmean(np.sum(moves**2, -1) / 2 / expected**2)))
     off = float(np.sqrt(np.nanmean(np.sum(moves**2, -1) / 2)))
     error = float(np.mean(ratio)) - 1
-    checks = (_range_verdict(error, u_ratio), _projection_verdict(off, in_u, held.rms_px, own))
+    checks = (
+        _range_verdict(error, u_ratio),
+        _projection_verdict(off, in_u, held.rms_px, own),
+        _axis_verdict(camera, own.camera),
+    )
     return Audit(camera, own, held.rms_px, error, u_ratio, off, in_u, checks, notes)
 
 
@@ -131,3 +135,14 @@ def _projection_verdict(off: float, in_u: float, rms: float, own: Calibration) -
     text = (f"directions differ by {off:.2f} px rms where the board was seen, {in_u:.1f} times what both uncertainties let expect; "
             f"the stated camera leaves {rms:.3f} px rms, the pictures' own {own.solution.rms_px:.3f} px")  # fmt: skip
     return Check("directions", in_u <= TOO_FAR, text, "calibrate anew: another focus, zoom, mode, or a bad calibration")
+
+
+def _axis_verdict(stated: Camera, other: Camera) -> Check:
+    """Whether the middle of the picture looks the same way: a shifted principal point is a turn to all else."""
+    middle = np.array([[(other.width_px - 1) / 2, (other.height_px - 1) / 2]])
+    off = float(np.hypot(*(stated.project(other.rays(middle)) - middle)[0]))
+    u = math.hypot(*(float(uncertainty_at(c, middle, turned=False)[0]) for c in (stated, other)))
+    text = f"the middle of the picture looks {off:.2f} px elsewhere by the stated camera (u of that {u:.2f} px)"
+    return Check(
+        "axis", off <= TOO_FAR * u, text, "calibrate anew: pictures were cropped, or the principal point was held"
+    )

@@ -33,6 +33,8 @@ ASSUMED_SCALE = 0.005
 """Relative u of a board's lengths where nobody measured the print (TRAPS of print scale: 97 % is common)."""
 OUTLIER = 6.0
 """A point so many robust standard deviations off is left out."""
+USELESS = 0.2
+"""A focal length of a larger relative u is none."""
 BAD_PICTURE = 3.0
 """A picture whose rms is so many times the others' is left out."""
 MOST_BAD = 0.3
@@ -216,6 +218,7 @@ def without_outliers(solution: Adjusted) -> tuple[Adjusted, list[int], dict[int,
     """
     kept = list(range(solution.problem.frames))
     why: dict[int, str] = {}
+    solution = _without_points(solution) or solution
     allowed = int(MOST_BAD * len(kept))
     while True:
         worst = _worst_frame(solution)
@@ -224,8 +227,7 @@ def without_outliers(solution: Adjusted) -> tuple[Adjusted, list[int], dict[int,
         frame, reason = worst
         why[kept.pop(frame)] = reason
         solution = _again(solution, solution.problem, [f for f in range(solution.problem.frames) if f != frame])
-    trimmed = _without_points(solution)
-    return (trimmed or solution), kept, why
+    return (_without_points(solution) or solution), kept, why
 
 
 def _worst_frame(solution: Adjusted) -> tuple[int, str] | None:
@@ -345,6 +347,7 @@ def _finished(solution: Adjusted, board: Board, seen: Seen, kept: Sequence[int],
     checks = checks_of(solution)
     final = widened(solution, checks)
     source = f"calibrated from {len(kept)} pictures of a {board.text} (rms {final.rms_px:.3f} px)"
+    _check_known(final.camera())
     pictures = _pictures(final, seen, kept, left)
     notes = (*doubts(checks), *_left_out_note(pictures), *notes)
     return Calibration((final.camera(0, source),), board, tuple(m.name for m in final.problem.models), pictures, checks, tried,
@@ -443,6 +446,8 @@ def _finished_rig(solution: Adjusted, board: Board, seen: tuple[Seen, Seen], kep
     final = widened(solution, checks)
     source = f"calibrated from {len(kept)} pairs of pictures of a {board.text} (rms {final.rms_px:.3f} px)"
     cameras = (final.camera(0, source), final.camera(1, source))
+    for camera in cameras:
+        _check_known(camera)
     cov = final.cov[:-2, :-2].copy()
     pose = final.state.relative[0]
     cov[-3:, -3:] += board.relative_u**2 * np.outer(pose.translation_m, pose.translation_m)
