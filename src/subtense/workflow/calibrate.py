@@ -354,6 +354,19 @@ def _finished(solution: Adjusted, board: Board, seen: Seen, kept: Sequence[int],
                        next_picture(final), final, None, notes)  # fmt: skip
 
 
+def _check_known(camera: Camera) -> None:
+    """Refuse a camera that the pictures hardly tell.
+
+    Raises:
+        GeometryError: how badly, and which pictures are missing.
+    """
+    relative = camera.u_f_px / float(camera.f_px)
+    if relative > USELESS:
+        raise GeometryError(f"these views leave the focal length open to {relative:.0%} (1s): take pictures of the board tilted by "
+                            "30 to 45 degrees in several directions, near and far, all over the picture".replace("%", " %"),
+                            code="degenerate_views")  # fmt: skip
+
+
 def _pictures(
     solution: Adjusted, seen: Seen, kept: Sequence[int], left: dict[int, str], camera: int = 0
 ) -> tuple[Picture, ...]:
