@@ -18,7 +18,7 @@ from ..arrays import Array, Indices, Pixels
 from ..board import Board
 from ..errors import InputError
 from ..subpixel import refine_quad
-from .dictionaries import dictionary, modules_of, size_of
+from .dictionaries import dictionary, modules_of, size_of, smallest_perimeter
 from .gray import Reduced, reduced, steps
 from .lattice import Lattice, fit_without_strays
 from .saddles import refined, windows_px
@@ -32,7 +32,7 @@ MOST_COLUMNS = 20
 MANY = 0.75
 """Share of the tags in the reduced picture that makes a search of the full one needless."""
 WORST_FIT = 0.05
-"""Rms residual over a step beyond which it is no board."""
+"""Rms residual over a tag's side beyond which it is no board."""
 WORST_MISFIT = 0.25
 """Rms residual of a tag's side over its contrast beyond which there is no edge."""
 
@@ -86,7 +86,7 @@ def _detected(small: Reduced, board: Board) -> tuple[Indices, Array, int]:
     for border in BORDER_MODULES:
         parameters = cv2.aruco.DetectorParameters()
         parameters.markerBorderBits = border
-        parameters.minMarkerPerimeterRate = 0.01
+        parameters.minMarkerPerimeterRate = smallest_perimeter(small.pixels)
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         quads, numbers, _ = cv2.aruco.ArucoDetector(dictionary(board.dictionary), parameters).detectMarkers(
             small.pixels
@@ -148,9 +148,8 @@ def _placed(
                 best = lattice.rms_px, (lattice, ids[whole], corners[whole], source)
     if best is None:
         return None
-    lattice = best[1][0]
-    step_px = np.sqrt(abs(np.linalg.det(lattice.jacobian(grid.mean(axis=0)[None], 1.0)[0])))
-    return best[1] if best[0] < WORST_FIT * step_px else None
+    side_px = float(np.median(np.hypot(*(quads[:, 1] - quads[:, 0]).T)))
+    return best[1] if best[0] < WORST_FIT * side_px else None
 
 
 def _has_squares(gray: Pixels, board: Board, lattice: Lattice) -> bool:

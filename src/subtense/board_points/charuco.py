@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Array, Indices, Pixels
 from ..board import Board
 from ..errors import InputError
-from .dictionaries import NAMES, SIZES, dictionary, dictionary_name, size_of
+from .dictionaries import NAMES, SIZES, dictionary, dictionary_name, size_of, smallest_perimeter
 from .gray import Reduced, reduced, steps
 from .lattice import fit
 from .saddles import refined, windows_px
@@ -24,12 +24,10 @@ MANY = 0.75
 """Share of the corners in the reduced picture that makes a search of the full one needless."""
 FEWEST_MARKERS = 4
 """Markers from which it is worth asking what is wrong with them."""
-SMALLEST_PERIMETER = 0.01
-"""Of a marker, over the picture's longest side: small boards in large pictures."""
 MOST_COLUMNS = 41
 """Columns up to which a wrong count is looked for."""
 WORST_FIT = 0.1
-"""Rms residual of the markers over a square's side beyond which they lie otherwise."""
+"""Rms residual of the markers over their side beyond which they lie otherwise."""
 LEAST_FREE = 0.1
 """Reach of a window in squares where the markers leave less."""
 BIGGEST = (
@@ -86,7 +84,7 @@ def _detected(gray: Pixels, board: Board) -> tuple[Array, Indices, Indices]:
 
     detector = cv2.aruco.CharucoDetector(opencv_board(board))
     parameters = detector.getDetectorParameters()
-    parameters.minMarkerPerimeterRate = SMALLEST_PERIMETER
+    parameters.minMarkerPerimeterRate = smallest_perimeter(gray)
     detector.setDetectorParameters(parameters)
     corners, ids, _, markers = detector.detectBoard(gray)
     numbers = np.zeros(0, int) if markers is None else np.asarray(np.reshape(markers, -1), int)
@@ -142,6 +140,7 @@ def _laid(small: Reduced, board: Board) -> tuple[int, int, bool] | None:
     height, width = small.pixels.shape
     inset = (1 - board.marker_m / board.square_m) / 2
     corner = np.array([[inset, inset], [1 - inset, inset], [1 - inset, 1 - inset], [inset, 1 - inset]])
+    side_px = float(np.median(np.hypot(*(quads[:, 1] - quads[:, 0]).T))) if len(quads) else 1.0
     best: tuple[float, tuple[int, int, bool]] | None = None
     for columns in range(3, MOST_COLUMNS):
         for white_first in (False, True):
@@ -151,7 +150,7 @@ def _laid(small: Reduced, board: Board) -> tuple[int, int, bool] | None:
             if lattice is None:
                 continue
             jac = np.linalg.det(lattice.jacobian(corners.mean(axis=0)[None], 1.0)[0])
-            misfit = lattice.rms_px / np.sqrt(abs(jac))
+            misfit = lattice.rms_px / side_px
             if jac > 0 and misfit < WORST_FIT and (best is None or misfit < best[0]):
                 best = misfit, (columns, int(place[:, 1].max()) + 1, white_first)
     return None if best is None else best[1]
@@ -170,7 +169,7 @@ def _markers(small: Reduced, name: str) -> tuple[Indices, Array]:
     import cv2
 
     parameters = cv2.aruco.DetectorParameters()
-    parameters.minMarkerPerimeterRate = SMALLEST_PERIMETER
+    parameters.minMarkerPerimeterRate = smallest_perimeter(small.pixels)
     quads, numbers, _ = cv2.aruco.ArucoDetector(dictionary(name), parameters).detectMarkers(small.pixels)
     if numbers is None:
         return np.zeros(0, int), np.zeros((0, 4, 2))

@@ -103,7 +103,7 @@ def _blobs(gray: Pixels, convexity: float) -> Any:
     import cv2
 
     parameters = cv2.SimpleBlobDetector.Params()
-    parameters.minArea, parameters.maxArea = 16.0, gray.size / 100
+    parameters.minArea, parameters.maxArea = 16.0, max(gray.size / 100, 32.0)
     parameters.minThreshold, parameters.maxThreshold = 20.0, 240.0
     parameters.minDistBetweenBlobs = 5.0
     parameters.minInertiaRatio = 0.05  # a disc seen at 70 degrees is three times as long as wide

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..arrays import Pixels
 from ..errors import InputError
 
 SIZES = (50, 100, 250, 1000)
+SMALLEST_PX, SMALLEST_SHARE = 36.0, 0.01
+"""Perimeter of a marker that can still be read; that over the picture's longest side below which there would be too many."""
 NAMES: dict[str, str] = {
     **{f"{bits}x{bits}_{size}": f"DICT_{bits}X{bits}_{size}" for bits in (4, 5, 6, 7) for size in SIZES},
     "aruco_original": "DICT_ARUCO_ORIGINAL", "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
@@ -47,3 +50,8 @@ def size_of(text: str) -> int:
 def modules_of(text: str) -> int:
     """Modules across a marker without its black border."""
     return int(dictionary(text).markerSize)
+
+
+def smallest_perimeter(gray: Pixels) -> float:
+    """Perimeter of the smallest marker to look for, over the picture's longest side, as OpenCV wants it."""
+    return max(SMALLEST_PX / float(max(gray.shape)), SMALLEST_SHARE)

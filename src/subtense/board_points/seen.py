@@ -10,7 +10,7 @@ from ..arrays import Array, Indices
 from ..board import Board
 from .lattice import FEWEST, Lattice, fit_without_strays, scatter_px
 
-FLOOR_PX = 0.02
+FLOOR_PX = 0.01
 """No point is better known: pixels sample, pictures are compressed."""
 ASSUMED_PX = 0.1
 """Where there are too few points to tell."""

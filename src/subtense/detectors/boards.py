@@ -15,6 +15,9 @@ from ..photo import Photo
 FEWEST_POINTS = 6
 """Points of a board whose parts have names that make a view."""
 
+SMALLEST_PICTURE_PX = 32
+"""Shorter side of a picture below which the detectors can't work."""
+
 
 def board_view(photo: Photo, board: Board) -> BoardView:
     """The points of a board that a photo shows.
@@ -71,6 +74,8 @@ def find_board(photo: Photo, board: Board) -> Seen | Missing:
         InputError: no such board can be found in any picture.
     """
     picture = gray.gray_of(photo.pixels)
+    if min(picture.shape) < SMALLEST_PICTURE_PX:
+        return Missing(0, f"the picture has only {photo.width_px} x {photo.height_px} px; use a larger one")
     if board.kind == "chessboard":
         least = chessboard.FEWEST_SQUARES
         if min(board.columns, board.rows) < least:
