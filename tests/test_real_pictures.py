@@ -83,6 +83,28 @@ def test_the_calibrated_focal_length_lies_in_the_interval_from_the_metadata(shar
     assert abs(camera.f_px - f_px) < 1.96 * camera.u_f_px
 
 
+@pytest.mark.parametrize("given", ["rpi-v1", "sensor=3.67mm"])
+def test_a_16_9_mode_of_a_raspberry_pi_is_in_the_interval(shared_data, given):
+    """Its maker's sensor width and focal length are 8 % off in this mode; the squares on the board told 1748 px."""
+    found = resolve_camera(Photo.load(shared_data / "known_size" / "agridrone" / "30cm.jpg"), given)
+    assert "aspect_mismatch" in [note.code for note in found.notes]
+    assert abs(found.camera.f_px - 1748) < 1.96 * found.camera.u_f_px
+
+
+def test_the_drone_tells_how_it_hung(shared_data):
+    folder = shared_data / "ground_plane" / "drone_nadir"
+    heights = [resolve_camera(Photo.load(folder / f"DJI_00{n}.JPG")).pose for n in (24, 25)]
+    assert [pose.height_m for pose in heights] == json.loads((folder / "truth.json").read_text())["relative_altitude"]
+    for pose in heights:
+        assert np.degrees([pose.pitch_rad, pose.roll_rad]) == pytest.approx([-89.9, 0])
+
+
+def test_a_phone_tells_that_it_looked_down(shared_data):
+    """The sheet's vertical edges, clicked by hand, meet below the picture: the camera looked 20 to 25 degrees down."""
+    pose = resolve_camera(Photo.load(shared_data / "exif_intrinsics" / "iphone8plus" / "IMG_1443.jpg")).pose
+    assert -27 < np.degrees(pose.pitch_rad) < -19 and abs(np.degrees(pose.roll_rad)) < 3
+
+
 def test_every_exif_sample_gives_a_camera_or_a_named_reason(shared_data):
     for path in sorted((shared_data / "exif_intrinsics" / "exif_samples").glob("*.jpg")):
         photo = Photo.load(path)
@@ -100,6 +122,10 @@ def test_pictures_stored_in_all_orientations_are_upright(shared_data):
             Photo.load(p) for p in sorted((shared_data / "exif_intrinsics" / "exif_samples").glob(f"{kind}_*.jpg"))
         ]
         assert {(p.width_px, p.height_px) for p in photos} == {upright}
+        cameras = [resolve_camera(p, "fov=60 ± 1 deg").camera for p in photos]
+        assert {(c.width_px, c.height_px, c.f_px, c.cx_px, c.cy_px) for c in cameras} == {
+            (*upright, cameras[0].f_px, (upright[0] - 1) / 2, (upright[1] - 1) / 2)
+        }
         first = photos[0].pixels.astype(float)
         assert all(np.corrcoef(first.ravel(), p.pixels.astype(float).ravel())[0, 1] > 0.9 for p in photos)
 

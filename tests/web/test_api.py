@@ -407,6 +407,26 @@ def test_what_a_photo_fills_into_the_calculator(server, desk):
     assert answer["camera"]["u_f_px"] == pytest.approx(camera["u_f_px"], rel=0.01)
 
 
+def test_what_a_photos_xmp_tells_reaches_the_camera(server):
+    """Decoded in a child, sent as JSON, resolved in the server: the same camera, pose and notes as on the command line."""
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA405] = 26
+    said = 'GimbalPitchDegree="-45.0" drone-dji:RelativeAltitude="+12.5" drone-dji:GpsLatitude="47.123456"'
+    crop = 'crs:HasCrop="True" crs:AlreadyApplied="True" crs:CropLeft="0" crs:CropTop="0" crs:CropRight="0.5" crs:CropBottom="0.5"'
+    xmp = (
+        '<x:xmpmeta xmlns:x="adobe:ns:meta/"><r:RDF xmlns:r="http://www.w3.org/1999/02/22-rdf-syntax-ns#"><r:Description '
+        f'xmlns:drone-dji="http://www.dji.com/drone-dji/1.0/" xmlns:crs="http://ns.adobe.com/camera-raw-settings/1.0/" '
+        f"drone-dji:{said} {crop}/></r:RDF></x:xmpmeta>"
+    )
+    held = server.photo(picture(400, 300, "JPEG", seed=12, exif=exif, xmp=xmp.encode()))
+    found = server.client.post("/api/camera", json={"photo": held["id"]}).json()
+    assert found["camera"]["f_px"] == pytest.approx(26 * 1000 / 43.2666, rel=1e-5)
+    assert found["camera"]["cx_px"] == pytest.approx(399.5)
+    assert found["camera"]["pose"]["height_above_start_m"] == 12.5
+    assert [note["code"] for note in found["notes"]] == ["cropped"]
+    assert "47.123" not in json.dumps(found) + json.dumps(held)
+
+
 def test_a_photo_without_a_camera_says_what_to_give(server):
     held = server.photo(picture(64, 48, seed=11))
     found = server.client.post("/api/camera", json={"photo": held["id"]}).json()

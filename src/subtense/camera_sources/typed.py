@@ -25,6 +25,8 @@ from ..told_camera import told_camera
 NAME = "typed"
 CUT_U = 0.08
 """Relative u where a picture does not have its sensor's proportions: a 16:9 mode of a 4:3 sensor was seen 8 % off either way."""
+SQUARISH, WIDE = 1.2, 1.6
+"""Long side over short of pictures that have their sensor's usual proportions."""
 KEYS = ("f", "sensor", "fov")
 
 
@@ -37,8 +39,9 @@ def camera(text: str, photo: Photo) -> Hypothesis:
     found = _from_pairs(text, photo) if "=" in text else _from_preset(text, photo)
     # a focal length in pixels is of the picture at hand; every other text is of the whole, unzoomed sensor
     notes = tagged_size(photo).notes if found.nominal_focal_m else ()
-    notes = (*notes, *_cut_note(text, photo))
-    return Hypothesis(NAME, found, found.source, notes)
+    if not _is_cut(text, photo):
+        return Hypothesis(NAME, found, found.source, notes)
+    return Hypothesis(NAME, _widened(found), found.source, (*notes, _cut_note(photo)))
 
 
 def _from_pairs(text: str, photo: Photo) -> Camera:
@@ -123,11 +126,7 @@ def _from_preset(text: str, photo: Photo) -> Camera:
         made = _from_lengths(
             preset.focal_length, preset.sensor_width, photo, f"preset {preset.name}: the range of its class"
         )
-    if not _cut_from(preset, photo):
-        return made
-    cov = np.array(made.cov)
-    cov[0, 0] += (CUT_U * float(made.f_px)) ** 2
-    return replace(made, cov=cov, id=None)
+    return made
 
 
 def _cut_from(preset: Preset, photo: Photo) -> bool:
@@ -138,12 +137,24 @@ def _cut_from(preset: Preset, photo: Photo) -> bool:
     return abs(long / short / float(preset.sensor_width.value / preset.sensor_height.value) - 1) > 0.04
 
 
-def _cut_note(text: str, photo: Photo) -> tuple[Note, ...]:
-    if "=" in text or not _cut_from(find_preset(text, "--camera"), photo):
-        return ()
+def _is_cut(text: str, photo: Photo) -> bool:
+    """Whether the text tells a sensor of other proportions than the photo's. Of a sensor's width alone they are taken as usual ones."""
+    if "=" not in text:
+        return _cut_from(find_preset(text, "--camera"), photo)
+    long, short = max(photo.stored_size_px), min(photo.stored_size_px)
+    return text.lstrip().startswith("sensor") and "," not in text and not SQUARISH <= long / short <= WIDE
+
+
+def _widened(made: Camera) -> Camera:
+    cov = np.array(made.cov)
+    cov[0, 0] += (CUT_U * float(made.f_px)) ** 2
+    return replace(made, cov=cov, id=None)
+
+
+def _cut_note(photo: Photo) -> Note:
     size = f"{photo.width_px} x {photo.height_px} px"
-    return (Note("aspect_mismatch", f"a picture of {size} does not have the sensor's proportions: this mode of the camera may use "
-                 f"a part of the sensor only; u is widened by {100 * CUT_U:.0f} %", "calibrate the camera in this mode"),)  # fmt: skip
+    return Note("aspect_mismatch", f"a picture of {size} does not have the sensor's proportions: this mode of the camera may use "
+                f"a part of the sensor only; u is widened by {100 * CUT_U:.0f} %", "calibrate the camera in this mode")  # fmt: skip
 
 
 def _above_zero(name: str, quantity: Quantity, text: str) -> None:
