@@ -1,11 +1,14 @@
 """Pictures that were cut, turned, zoomed, filmed or straightened: what the camera becomes, and what is noted."""
 
+import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from written_photos import packet, write
 
+from subtense import Observation, Quantity, measure_lines
 from subtense.errors import UnknownCameraError
 from subtense.photo import Photo
 from subtense.workflow.resolve_camera import resolve_camera
@@ -249,3 +252,41 @@ def test_the_class_of_the_lens_decides_what_distortion_may_be(take, more, least,
     found = take(**more).camera
     assert least <= math.sqrt(found.cov[4, 4]) <= most
     assert found.coefficients[0] == 0
+
+
+def test_a_preview_of_other_proportions_tells_of_a_crop(tmp_path):
+    photo = Photo.load(write(tmp_path / "a.jpg", (400, 300), **PHONE))
+
+    def noted(size):
+        return codes(resolve_camera(replace(photo, metadata=replace(photo.metadata, thumbnail_size_px=size))))
+
+    assert noted((160, 107)) == ["cropped"]
+    assert noted((160, 120)) == noted(None) == []
+
+
+@pytest.mark.parametrize("k1", [-0.05, 0.05])
+def test_the_distortion_of_a_kit_lens_is_within_u_far_from_the_middle(tmp_path, k1):
+    """A frontal rod of 100 mm at 2 m near the corner, drawn by a lens with this k1, measured without knowing it."""
+    photo = Photo.load(write(tmp_path / "a.jpg", (3000, 2000), f35=28, focal=18.0, make="Canon"))
+    plain = resolve_camera(photo).camera
+    true = replace(plain, distortion=np.array([k1, 0, 0, 0, 0]))
+    for x in (0.05, 1.0):
+        ends = true.project(np.array([[x, x / 2, 2.0], [x + 0.1, x / 2, 2.0]]))
+        document = measure_lines(
+            photo, [Observation(ends, 0.2)], [Quantity.normal(0.1, 0.0001, "m")], tilt=Quantity.exact(0.0, "rad")
+        )
+        depth = next(m for m in document.measurements if m.what == "depth")
+        assert abs(depth.value - 2.0) < 2 * depth.u
+        far = [note for note in document.measurements[0].notes if note.code == "distortion_unknown"]
+        assert len(far) == (x > 0.5)
+        share = {c.name: c.share for c in depth.budget}.get("lens distortion", 0.0)
+        assert (share > 0.3) if far else (share < 0.02)
+
+
+def test_a_calibrated_lens_gets_no_such_note(tmp_path):
+    photo = Photo.load(write(tmp_path / "a.jpg", (3000, 2000), f35=28))
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps({"width_px": 3000, "height_px": 2000, "f_px": 2000, "cx_px": 1499.5, "cy_px": 999.5}))
+    line = [Observation(np.array([[10.0, 10.0], [200.0, 10.0]]), 0.5)]
+    document = measure_lines(photo, line, [Quantity.normal(0.1, 0.001, "m")], camera=str(path))
+    assert "distortion_unknown" not in [note.code for note in document.measurements[0].notes]

@@ -1,13 +1,23 @@
 import io
 import struct
 
+import heic_boxes
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 from PIL.TiffImagePlugin import IFDRational
 
-from subtense.tiff_tags import camera_tags, is_raw_tiff, raw_camera_tags
+from subtense.heif_boxes import camera_matrix
+from subtense.tiff_tags import (
+    apple_acceleration,
+    camera_tags,
+    is_raw_tiff,
+    preview_size,
+    private_tags,
+    raw_camera_tags,
+    xmp_packet,
+)
 
 
 def exif():
@@ -105,3 +115,24 @@ def test_damaged_bytes_never_raise(data):
     is_raw_tiff(cut)
     raw_camera_tags(b"FUJIFILMCCD-RAW" + cut)
     raw_camera_tags(b"\0\0\0\x18ftypcrx CMT1" + cut)
+    for read in (preview_size, private_tags, xmp_packet):
+        read(cut)
+    apple_acceleration(b"Apple iOS\0\0\x01MM" + cut)
+
+
+@given(st.data())
+def test_damaged_boxes_of_a_heic_never_raise(data):
+    whole = bytearray(heic_boxes.heic(properties=[heic_boxes.cmin(1.2, 0.5, 0.5), heic_boxes.clap(300, 200, 1, 2)]))
+    meta = whole.find(b"meta")
+    for _ in range(data.draw(st.integers(1, 12))):
+        whole[data.draw(st.integers(meta, meta + 420))] = data.draw(st.integers(0, 255))
+    camera_matrix(bytes(whole[: data.draw(st.integers(0, len(whole)))]))
+
+
+def test_the_xmp_packet_of_a_raw_is_found():
+    """A DNG: XMP stands in a tag of bytes, longer than other values may be."""
+    packet = b"<x>" + b" " * 50_000 + b"</x>"
+    assert xmp_packet(tiff([(0xC612, 1, 4, 0x0401), (0x02BC, 1, len(packet), 38)], packet)) == packet
+    assert xmp_packet(tiff([(0x02BC, 7, 4, 0x3E613C20)])) == b" <a>"
+    assert xmp_packet(tiff([(0xC612, 1, 4, 0x0401)])) is None
+    assert xmp_packet(b"\xff\xd8") is None
