@@ -45,8 +45,13 @@ def told_camera(photo: Photo, f_px: float, relative_u: float, source: str, size:
     cov = np.array(made.cov)
     aspect, aspect_u, _ = pixel_shape(photo)
     cov[1, 1] = aspect_u**2
-    cov[[2, 3], [2, 3]] = (math.hypot(UNKNOWN_CENTRE, size.centre_u) * max(width, height)) ** 2
-    made = replace(made, cx_px=size.middle_px[0], cy_px=size.middle_px[1], aspect=aspect, cov=cov)
+    centre_u = math.hypot(UNKNOWN_CENTRE, size.centre_u)
+    cov[[2, 3], [2, 3]] = (centre_u * max(width, height)) ** 2
+    sources = {
+        **made.part_sources,
+        "principal point": f"assumed: the middle of the whole picture, to {100 * centre_u:.2g} % of the width",
+    }
+    made = replace(made, cx_px=size.middle_px[0], cy_px=size.middle_px[1], aspect=aspect, cov=cov, part_sources=sources)
     return upright_camera(made, tags.orientation)
 
 
