@@ -31,7 +31,7 @@ MOST_COLUMNS = 20
 """Columns up to which a wrong count is looked for."""
 MANY = 0.75
 """Share of the tags in the reduced picture that makes a search of the full one needless."""
-WORST_FIT = 0.05
+WORST_FIT = 0.12
 """Rms residual over a tag's side beyond which it is no board."""
 WORST_MISFIT = 0.25
 """Rms residual of a tag's side over its contrast beyond which there is no edge."""
