@@ -6,6 +6,7 @@ Tags are in the frame the sensor stored. The camera is made there and turned as 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -53,6 +54,17 @@ def told_camera(photo: Photo, f_px: float, relative_u: float, source: str, size:
     }
     made = replace(made, cx_px=size.middle_px[0], cy_px=size.middle_px[1], aspect=aspect, cov=cov, part_sources=sources)
     return upright_camera(made, tags.orientation)
+
+
+def held_together(readings: Sequence[Camera]) -> Camera:
+    """One camera with the mean focal length of several readings, and a u that has all of them within one of it."""
+    f = [float(one.f_px) for one in readings]
+    middle, half = (max(f) + min(f)) / 2, (max(f) - min(f)) / 2
+    if not half:
+        return readings[0]
+    cov = np.array(readings[0].cov)
+    cov[0, 0] = (readings[0].u_f_px * middle / f[0]) ** 2 + half**2
+    return replace(readings[0], f_px=middle, cov=cov, id=None)
 
 
 def pixel_shape(photo: Photo) -> tuple[float, float, tuple[Note, ...]]:
