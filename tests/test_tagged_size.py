@@ -14,7 +14,7 @@ from subtense.photo import Photo
 from subtense.workflow.resolve_camera import resolve_camera
 
 DIAGONAL_MM = math.hypot(36, 24)
-PHONE = {"make": "Apple", "model": "iPhone 11", "f35": 26, "focal": 4.25, "f_number": 1.8, "exposure": 0.01}
+PHONE = {"make": "Apple", "model": "iPhone of no table", "f35": 26, "focal": 4.25, "f_number": 1.8, "exposure": 0.01}
 
 
 @pytest.fixture

@@ -469,6 +469,16 @@ def presets(words: tuple[str, ...]) -> None:
 
 @main.command()
 @click.argument("words", nargs=-1)
+def sensors(words: tuple[str, ...]) -> None:
+    """Sensors of phones' lenses, drones, camera boards and machine vision: what is known of a camera by its name."""
+    from .reports.table import sensor_table
+    from .sensors import search
+
+    click.echo(sensor_table(search(words)))
+
+
+@main.command()
+@click.argument("words", nargs=-1)
 @click.option("--file", "extra", type=click.Path(path_type=Path), help="More of them, from a TOML file of your own.")
 def targets(words: tuple[str, ...], extra: Path | None) -> None:
     """Things of known size: paper, cards, coins, plates, signs, balls, bodies, ..., each with its doubt."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..presets import Preset
+    from ..sensors import Sensor
     from ..targets import KnownTarget
 
 
@@ -43,3 +44,14 @@ def target_table(targets: Sequence[KnownTarget]) -> str:
     """Name, size with its doubt, which length it is, and title of things of known size."""
     rows = [("name", "size", "which length", "what it is")]
     return columns([*rows, *((t.name, t.text, t.what, t.title) for t in targets)])
+
+
+def sensor_table(sensors: Sequence[Sensor]) -> str:
+    """Name, size, pixels and pixel pitch, with the relative u, and the title of sensors; lenses where the row is of one."""
+    rows = [("name", "sensor", "u", "pixels", "pitch", "lens", "what it is")]
+    for s in sensors:
+        lens = " = ".join(f"{x:g} mm" for x in (s.focal_mm, s.f35_mm) if x)
+        pitch = f"{1000 * s.width_mm / s.native_px[0]:.3g} µm"
+        rows.append((s.name, f"{s.width_mm:.2f} x {s.height_mm:.2f} mm", f"{100 * s.u:.2g} %", f"{s.native_px[0]} x {s.native_px[1]}",
+                     pitch, lens or "-", s.title))  # fmt: skip
+    return columns(rows)

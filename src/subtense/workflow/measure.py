@@ -129,7 +129,7 @@ def no_camera_document(photo: Photo, why: UnknownCameraError) -> Document:
 
 def camera_document(photo: Photo, given_camera: str | Resolved | None = None, *, level: float = 0.95) -> Document:
     """The camera of a photo alone: its focal length in pixels, and what every source says."""
-    resolved = given_camera if isinstance(given_camera, Resolved) else resolve_camera(photo, given_camera)
+    resolved = given_camera if isinstance(given_camera, Resolved) else resolve_camera(photo, given_camera, ask_all=True)
     camera = resolved.camera
     half = normal_quantile(0.5 + level / 2) * camera.u_f_px
     f = float(camera.f_px)

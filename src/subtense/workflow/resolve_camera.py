@@ -14,18 +14,21 @@ from ..camera_files import selector
 from ..camera_files.formats import ENDINGS
 from ..camera_sources import (
     calibration_file,
+    colmap_sensors,
     dji_tags,
     exif_35mm,
     exif_focal_plane,
     google_tags,
     heic_matrix,
+    lens_database,
     panorama_tags,
     pix4d_tags,
+    sensor_database,
     typed,
 )
 from ..edited import refusal
 from ..errors import InputError, UnknownCameraError
-from ..hypothesis import Hypothesis
+from ..hypothesis import ASSUMED_DISTORTION, Hypothesis
 from ..photo import Photo
 from ..quantity import Note
 from ..told_pose import ToldPose, told_pose
@@ -37,9 +40,14 @@ CAMERA_SOURCES: dict[str, Callable[[Photo], Hypothesis]] = {
     heic_matrix.NAME: heic_matrix.camera,
     google_tags.NAME: google_tags.camera,
     exif_focal_plane.NAME: exif_focal_plane.camera,
+    sensor_database.NAME: sensor_database.camera,
+    lens_database.NAME: lens_database.camera,
     exif_35mm.NAME: exif_35mm.camera,
+    colmap_sensors.NAME: colmap_sensors.camera,
 }
 """Sources that need nothing but the photo, in order of trust where their u is equal."""
+LAST_RESORTS = (colmap_sensors.NAME,)
+"""Those that take 0.2 s and know less than the others: asked where no other answers, or who asks wants to see all."""
 
 WHAT_TO_GIVE = "give --camera: a calibration file, f=1500px, f=35mm,sensor=14.1mm, fov=70deg, or a preset"
 AGREE_WITHIN = 2.0
@@ -88,19 +96,22 @@ class Resolved:
         return {**self.camera.to_json(), "u_f_px": self.camera.u_f_px, "hypotheses": said, **pose}
 
 
-def resolve_camera(photo: Photo, given: str | SentFile | None = None, *, paths: bool = True) -> Resolved:
+def resolve_camera(
+    photo: Photo, given: str | SentFile | None = None, *, paths: bool = True, ask_all: bool = False
+) -> Resolved:
     """The camera of a photo.
 
     Args:
         photo: the picture.
         given: what the user said: a calibration file, `f=...`, `fov=...`, or a preset; None to go by the photo alone.
         paths: whether a text may name a file of this machine.
+        ask_all: whether LAST_RESORTS are asked where others have answered.
 
     Raises:
         UnknownCameraError: no source has a camera; it lists why, and what to give.
         InputError, FileFormatError: `given` can't be used.
     """
-    hypotheses = _settled(_without_pinholes(photo, [source(photo) for source in CAMERA_SOURCES.values()]))
+    hypotheses = _settled(_without_pinholes(photo, _asked(photo, ask_all=ask_all, given=given is not None)))
     if given is not None:
         chosen = _without_pinholes(photo, [_given(given, photo, paths=paths)])[0]
         hypotheses.insert(0, chosen)
@@ -109,9 +120,45 @@ def resolve_camera(photo: Photo, given: str | SentFile | None = None, *, paths: 
     if chosen.camera is None:
         raise _unknown(photo, hypotheses)
     camera, disagreement = _compared(chosen, hypotheses, widen=given is None)
+    lens_notes: tuple[Note, ...] = ()
+    if given is None:
+        camera, lens_notes = _with_lens(camera, hypotheses)
     refused = tuple(n for h in hypotheses if h.camera is None for n in h.notes)
-    notes = dict.fromkeys((*photo.notes, *chosen.notes, *(() if given else refused), *disagreement))
+    notes = dict.fromkeys((*photo.notes, *chosen.notes, *(() if given else refused), *lens_notes, *disagreement))
     return Resolved(camera, chosen, tuple(hypotheses), tuple(notes), told_pose(photo))
+
+
+def _asked(photo: Photo, *, ask_all: bool, given: bool) -> list[Hypothesis]:
+    """What every source says, LAST_RESORTS only where they are needed."""
+    said = {name: source(photo) for name, source in CAMERA_SOURCES.items() if name not in LAST_RESORTS}
+    needed = ask_all or not (given or any(one.camera for one in said.values()))
+    for name in LAST_RESORTS:
+        reason = "not asked, as another source has answered; `subtense camera` asks it"
+        said[name] = CAMERA_SOURCES[name](photo) if needed else Hypothesis(name, None, reason)
+    return [said[name] for name in CAMERA_SOURCES]
+
+
+def _with_lens(camera: Camera, hypotheses: list[Hypothesis]) -> tuple[Camera, tuple[Note, ...]]:
+    """The camera with the lens database's distortion, where nothing else tells one, and what it notes of it.
+
+    Its u of the focal length comes along: with the distortion it is in doubt where in the picture the nominal one holds.
+    """
+    found = next((h for h in hypotheses if h.source == lens_database.NAME and h.camera is not None), None)
+    assumed = camera.part_sources.get("lens distortion", "").startswith(ASSUMED_DISTORTION)
+    if found is None or found.camera is None or not assumed or camera.lens != found.camera.lens:
+        return camera, ()
+    lens, f = found.camera, float(camera.f_px)
+    cov = np.array(camera.cov)
+    assert lens.cov is not None
+    notes = tuple(note for note in found.notes if note.code == lens_database.CORRECTED)
+    if not notes:  # perhaps corrected by the camera: no coefficients, but a doubt of their size
+        cov[4, 4] = max(cov[4, 4], lens.cov[4, 4])
+        return replace(camera, cov=cov, id=None), ()
+    cov[4:, :], cov[:, 4:] = 0.0, 0.0
+    cov[4:, 4:] = lens.cov[4:, 4:]
+    cov[0, 0] = max(cov[0, 0], (found.relative_u * f) ** 2)
+    sources = {**camera.part_sources, "lens distortion": lens.part_sources["lens distortion"]}
+    return replace(camera, distortion=lens.coefficients, cov=cov, part_sources=sources, id=None), notes
 
 
 def _unknown(photo: Photo, hypotheses: list[Hypothesis]) -> UnknownCameraError:
