@@ -9,6 +9,7 @@ from typing import Any
 
 from .errors import InputError
 from .quantity import Quantity
+from .sensors import Sensor, sensors
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def presets() -> dict[str, Preset]:
 
 
 def find_preset(name: str, option: str = "preset") -> Preset:
-    """The preset of a name or alias, whatever its case.
+    """The preset of a name or alias, whatever its case; names of the table of sensors are presets too.
 
     Raises:
         InputError: no such preset; the nearest names are given.
@@ -74,10 +75,21 @@ def find_preset(name: str, option: str = "preset") -> Preset:
     for preset in presets().values():
         if wanted in map(_plain, (preset.name, preset.title, *preset.aliases)):
             return preset
+    if wanted in sensors():
+        return _of_table(sensors()[wanted])
     import difflib
 
     near = difflib.get_close_matches(wanted, presets(), 3, 0.4) or list(presets())[:5]
     raise InputError(option, name, f"known are {', '.join(near)} and more: see `subtense presets`")
+
+
+def _of_table(row: Sensor) -> Preset:
+    """A row of the table of sensors, whose list is apart."""
+    text = f"sensor {row.name}: spread and rounding of published sizes"
+    width, height = (
+        Quantity.normal(side / 1000, row.u * side / 1000, "m", text) for side in (row.width_mm, row.height_mm)
+    )
+    return Preset(row.name, row.title, "sensor", width, height, None, None, (), row.source)
 
 
 def _plain(name: str) -> str:

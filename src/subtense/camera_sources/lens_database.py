@@ -40,8 +40,6 @@ from ..tagged_size import TaggedSize, tagged_size
 from ..told_camera import told_camera
 
 NAME = "lens_database"
-CORRECTED = "distortion_corrected"
-"""The note of a distortion that is applied."""
 CROP_U = 0.015
 """Relative u of a crop factor: it is of the class, as 1.5 or 1.6, or of one measured sensor."""
 SPECIMEN_U = 0.22
@@ -121,7 +119,7 @@ def _hypothesis(photo: Photo, size: TaggedSize, body: Any, f_px: float, relative
         )
     # where in the picture the nominal focal length holds, in the middle or at the radius that the database leaves, nobody says
     made = told_camera(photo, f_px, math.hypot(relative, distortion.scale - 1), text, size)
-    note = Note(CORRECTED, f"the distortion of {lens.model} is corrected by Lensfun's database ({distortion.model}, another "
+    note = Note("distortion_corrected", f"the distortion of {lens.model} is corrected by Lensfun's database ({distortion.model}, another "
                 f"specimen: to {100 * SPECIMEN_U:.0f} %)", "calibrate the camera; give it with --camera if the picture was corrected "
                 "before")  # fmt: skip
     return Hypothesis(NAME, _corrected(made, distortion, lens.model), f"{text}; {lens.model}", (*size.notes, note))

@@ -150,7 +150,7 @@ def _with_lens(camera: Camera, hypotheses: list[Hypothesis]) -> tuple[Camera, tu
     lens, f = found.camera, float(camera.f_px)
     cov = np.array(camera.cov)
     assert lens.cov is not None
-    notes = tuple(note for note in found.notes if note.code == lens_database.CORRECTED)
+    notes = tuple(note for note in found.notes if note.code == "distortion_corrected")
     if not notes:  # perhaps corrected by the camera: no coefficients, but a doubt of their size
         cov[4, 4] = max(cov[4, 4], lens.cov[4, 4])
         return replace(camera, cov=cov, id=None), ()
