@@ -22,7 +22,6 @@ from .errors import GeometryError
 from .geometry import Pose, rotation_from_vector
 from .lenses import LENSES
 
-
 CONVERGED = 1e-7
 """Relative change of the sum of squares at which a solution stands: a thousandth of what one unknown is worth."""
 
@@ -241,7 +240,7 @@ def project(lens: str, intrinsics: Array, points_m: Array) -> Array:
 def projection(lens: str, intrinsics: Array, points_m: Array, free: Sequence[int]) -> tuple[Array, Array, Array]:
     """Pixels, their derivatives (..., 2, 4 + k) by the intrinsics and (..., 2, 3) by the points.
 
-    Those of the lens by central differences, which serve every lens model; coefficients that are not `free` get 0.
+    Those of the lens by differences, which serve every lens model; coefficients that are not `free` get 0.
     """
     f, aspect, cx, cy = intrinsics[:4]
     k = intrinsics[4:]
@@ -252,21 +251,36 @@ def projection(lens: str, intrinsics: Array, points_m: Array, free: Sequence[int
     inner[..., 0, 0], inner[..., 1, 0], inner[..., 1, 1] = x, aspect * y, f * y
     inner[..., 0, 2] = inner[..., 1, 3] = 1
     for i in free:
-        step = np.zeros(k.size)
-        step[i] = 1e-5
-        inner[..., 4 + i] = (
-            _difference(_plane(lens, points_m, k + step), _plane(lens, points_m, k - step), 1e-5) * scale
-        )
-    outer = np.empty((*x.shape, 2, 3))
-    reach = 1e-6 * np.linalg.norm(points_m, axis=-1)[..., None]
-    for i in range(3):
+        inner[..., 4 + i] = _by_coefficient(lens, points_m, k, i, (x, y)) * scale
+    return pixels, inner, _by_point(lens, points_m, k) * scale[:, None]
+
+
+def _by_coefficient(lens: str, points_m: Array, k: Array, i: int, here: tuple[Array, Array]) -> Array:
+    """(..., 2) exact where the image is linear in a coefficient, by central differences else."""
+    unit = np.eye(k.size)[i]
+    if i in LENSES[lens].linear:
+        return _difference(_plane(lens, points_m, k + unit), here, 1.0)
+    step = 1e-5
+    return _difference(_plane(lens, points_m, k + step * unit), _plane(lens, points_m, k - step * unit), 2 * step)
+
+
+def _by_point(lens: str, points_m: Array, k: Array) -> Array:
+    """(..., 2, 3) by central differences; only the direction counts, so x d/dx + y d/dy + z d/dz = 0."""
+    z = points_m[..., 2]
+    far = np.linalg.norm(points_m, axis=-1)
+    reach = 1e-6 * far[..., None]
+    found = np.empty((*z.shape, 2, 3))
+    sideways = bool(np.any(abs(z) < 0.01 * far))
+    for i in range(3 if sideways else 2):
         step = np.eye(3)[i] * reach
-        outer[..., i] = _difference(_plane(lens, points_m + step, k), _plane(lens, points_m - step, k), reach) * scale
-    return pixels, inner, outer
+        found[..., i] = _difference(_plane(lens, points_m + step, k), _plane(lens, points_m - step, k), 2 * reach)
+    if not sideways:
+        found[..., 2] = -(found[..., 0] * points_m[..., :1] + found[..., 1] * points_m[..., 1:2]) / z[..., None]
+    return found
 
 
 def _difference(above: tuple[Array, Array], below: tuple[Array, Array], step: float | Array) -> Array:
-    return np.asarray(np.stack([above[0] - below[0], above[1] - below[1]], -1) / (2 * step))
+    return np.asarray(np.stack([above[0] - below[0], above[1] - below[1]], -1) / step)
 
 
 def board_points(problem: Problem, state: State, ids: Indices) -> Array:
@@ -473,13 +487,23 @@ def _has_pole(problem: Problem, state: State) -> bool:
     return False
 
 
-def adjust(problem: Problem, start: State, iterations: int = 60) -> Adjusted:
+WARM = 1e-7
+"""Damping for a start that is nearly a solution."""
+
+
+def adjust(problem: Problem, start: State, iterations: int = 60, damping: float = 1e-3) -> Adjusted:
     """The least-squares solution from a start.
+
+    Args:
+        problem: what is to be explained.
+        start: where to begin.
+        iterations: at most.
+        damping: of the first step; WARM where the start is nearly a solution.
 
     Raises:
         GeometryError: the views leave something open (`degenerate_views`), or no solution was reached (`no_convergence`).
     """
-    state, cost, damping = start, _cost(problem, start), 1e-3
+    state, cost = start, _cost(problem, start)
     if not np.isfinite(cost):
         raise GeometryError("the calibration found no start: points can't be projected", code="no_convergence")
     for _ in range(iterations):

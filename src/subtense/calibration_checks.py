@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .adjustment import LENS_MODELS, RATIONAL, Adjusted, LensModel, Problem, State, adjust, inverse, reduced
+from .adjustment import LENS_MODELS, RATIONAL, WARM, Adjusted, LensModel, Problem, State, adjust, inverse, reduced
 from .arrays import Array, Indices
 from .errors import GeometryError
 
@@ -108,7 +108,7 @@ def _better(solution: Adjusted, problem: Problem, start: State) -> tuple[Adjuste
     found = []
     for begin in _starts(problem, start):
         with suppress(GeometryError):
-            found.append(adjust(problem, begin))
+            found.append(adjust(problem, begin, damping=WARM))
     if not found:
         return None
     richer = min(found, key=lambda a: a.chi2)
@@ -296,7 +296,7 @@ def _fit_of(solution: Adjusted, frames: Sequence[int]) -> Adjusted | None:
         state.boards, rotation=state.boards.rotation[picked], translation_m=state.boards.translation_m[picked]
     )
     try:
-        return adjust(solution.problem.subset(picked), replace(state, boards=boards))
+        return adjust(solution.problem.subset(picked), replace(state, boards=boards), damping=WARM)
     except GeometryError:
         return None
 

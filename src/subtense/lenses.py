@@ -33,6 +33,7 @@ class Lens:
         perspective: whether straight lines stay straight but for distortion, as the pinhole methods need.
         formula: `to_plane` without the refusal where the image folds over: smooth, for who estimates coefficients; None where
             nothing folds.
+        linear: coefficients that the image is linear in.
     """
 
     title: str
@@ -41,6 +42,7 @@ class Lens:
     to_ray: Callable[[Array, Array, Coefficients], Triple]
     perspective: bool = True
     formula: Callable[[Array, Array, Array, Coefficients], Pair] | None = None
+    linear: tuple[int, ...] = ()
 
 
 # -- pinhole ---------------------------------------------------------------------------------------
@@ -275,7 +277,9 @@ LENSES: dict[str, Lens] = {
     "brown_conrady": Lens(
         "Brown-Conrady (OpenCV)", (5, 8, 12, 14), _brown_to_plane, _brown_to_ray, True, _brown_formula
     ),
-    "fisheye": Lens("Kannala-Brandt fisheye", (4,), _fisheye_to_plane, _fisheye_to_ray, True, _fisheye_formula),
+    "fisheye": Lens(
+        "Kannala-Brandt fisheye", (4,), _fisheye_to_plane, _fisheye_to_ray, True, _fisheye_formula, (0, 1, 2, 3)
+    ),
     "equirectangular": Lens("equirectangular panorama", (0,), _panorama_to_plane, _panorama_to_ray, False),
 }
 """Every lens model. In a file or an option they go by these names."""

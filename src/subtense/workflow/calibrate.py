@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..adjustment import LENS_MODELS, Adjusted, LensModel, Problem, Sight, adjust
+from ..adjustment import LENS_MODELS, WARM, Adjusted, LensModel, Problem, Sight, adjust
 from ..adjustment_start import start_state
 from ..arrays import Array
 from ..board import Board, BoardView
@@ -243,7 +243,7 @@ def _again(solution: Adjusted, problem: Problem, frames: Sequence[int]) -> Adjus
     """Adjusted again with some frames only, from where it was."""
     picked = list(frames)
     boards = Pose(solution.state.boards.rotation[picked], solution.state.boards.translation_m[picked])
-    return adjust(problem.subset(picked), replace(solution.state, boards=boards))
+    return adjust(problem.subset(picked), replace(solution.state, boards=boards), damping=WARM)
 
 
 def _without_points(solution: Adjusted) -> Adjusted | None:
@@ -262,7 +262,7 @@ def _without_points(solution: Adjusted) -> Adjusted | None:
         view = sight.view
         sights.append(replace(sight, view=replace(view, ids=view.ids[good], points_px=view.points_px[good],
                                                   sigma_px=view.sigma_px[good])))  # fmt: skip
-    return adjust(replace(solution.problem, sights=tuple(sights)), solution.state) if changed else None
+    return adjust(replace(solution.problem, sights=tuple(sights)), solution.state, damping=WARM) if changed else None
 
 
 # -- which lens model ------------------------------------------------------------------------------------------------------
@@ -309,7 +309,8 @@ def _chosen_flat(solution: Adjusted) -> tuple[Adjusted, dict[str, float]]:
     if bow is None or bow.better is None:
         return chosen_model(solution)
     chosen, tried = chosen_model(bow.better)
-    return adjust(replace(chosen.problem, free_warp=False), replace(chosen.state, warp_m=np.zeros(2))), tried
+    flat = replace(chosen.state, warp_m=np.zeros(2))
+    return adjust(replace(chosen.problem, free_warp=False), flat, damping=WARM), tried
 
 
 def _with_model(solution: Adjusted, model: LensModel) -> Adjusted:
@@ -320,7 +321,7 @@ def _with_model(solution: Adjusted, model: LensModel) -> Adjusted:
     theta = np.zeros(4 + model.count)
     shared = [*range(4), *(4 + k for k in model.free if k in own.free)]
     theta[shared] = solution.state.intrinsics[0][shared]
-    return adjust(problem, replace(solution.state, intrinsics=(theta,)))
+    return adjust(problem, replace(solution.state, intrinsics=(theta,)), damping=WARM)
 
 
 def _foretold(solution: Adjusted, folds: int) -> Array:
@@ -334,7 +335,7 @@ def _foretold(solution: Adjusted, folds: int) -> Array:
         trained = _again(solution, solution.problem, [int(f) for f in frames if f not in out])
         boards = Pose(solution.state.boards.rotation[out], solution.state.boards.translation_m[out])
         held = replace(solution.problem.subset(list(out)), held=True)
-        told = adjust(held, replace(trained.state, boards=boards))
+        told = adjust(held, replace(trained.state, boards=boards), damping=WARM)
         found[out] = told.rms_of_frames_px() ** 2 / 2
     return found
 
