@@ -46,8 +46,10 @@ SPECIMEN_U = 0.22
 """Relative u of a lens's distortion, of another specimen of it."""
 REFLEX_MOUNTS = ("Canon EF", "Canon EF-S", "Nikon F AF", "Pentax KAF", "Sony Alpha", "Minolta AF", "Sigma SA")
 """Their cameras write JPEGs with the lens's distortion, unless told otherwise."""
-GRID_PX = 120
-"""Half the long side of the grid on which the database is asked."""
+LONG_SIDE_PX = 1200
+"""Of the picture for which the database is asked: its map is true to some tenths of a pixel, so a small one would be too rough."""
+STEP_PX = 10
+"""Of these pixels every tenth is fitted."""
 ZOOM_SLACK = 1.02
 """A tagged focal length may lie so far outside of the lens's range."""
 _EDITORS = re.compile(
@@ -229,15 +231,15 @@ def _distortion(
         proportions: long side of the picture over its short one.
         f_in_long_sides: focal length in long sides of the picture.
     """
-    size = (2 * GRID_PX, max(2, round(2 * GRID_PX / proportions)))
+    size = (LONG_SIDE_PX, round(LONG_SIDE_PX / proportions))
     places = distorted_places(lens, crop, focal_mm, size)
     if places is None:
         return None
     f_px = f_in_long_sides * size[0]
     middle = np.array([(size[0] - 1) / 2, (size[1] - 1) / 2])
-    ideal = np.stack(np.meshgrid(np.arange(size[0]), np.arange(size[1])), -1) - middle
+    ideal = (np.stack(np.meshgrid(np.arange(size[0]), np.arange(size[1])), -1) - middle)[::STEP_PX, ::STEP_PX]
     radius = np.hypot(*np.moveaxis(ideal, -1, 0)).ravel() / f_px
-    factor = np.hypot(*np.moveaxis(places - middle, -1, 0)).ravel() / f_px / radius
+    factor = np.hypot(*np.moveaxis(places[::STEP_PX, ::STEP_PX] - middle, -1, 0)).ravel() / f_px / radius
     terms = radius[:, None] ** np.array([0, 2, 4, 6])
     fit = np.linalg.lstsq(terms * radius[:, None], factor * radius, rcond=None)[0]  # misses count by their distance
     scale = float(fit[0])

@@ -37,8 +37,9 @@ LEAST_ZOOM = 1.12
 
 @dataclass(frozen=True)
 class _Told:
-    """What the equivalent adds to the row: the digital zoom, its u, and a note."""
+    """What the equivalent adds to the row: which readings it leaves, the digital zoom, its u, and a note."""
 
+    f_px: list[float]
     zoom: float = 1.0
     u: float = 0.0
     notes: tuple[Note, ...] = ()
@@ -86,7 +87,7 @@ def _hypothesis(photo: Photo, row: Sensor, size: TaggedSize, spans: list[float],
         return Hypothesis(NAME, None, told)
     text = f"table: {row.title}, sensor {row.width_mm:.3g} mm wide, focal length {focal:g} mm"
     u = math.hypot(relative, told.u)
-    readings = [_distorted(told_camera(photo, f * told.zoom, u, text, size), row) for f in f_px]
+    readings = [_distorted(told_camera(photo, f * told.zoom, u, text, size), row) for f in told.f_px]
     return Hypothesis(NAME, held_together(readings), text, (*size.notes, *notes, *_lens_note(row), *told.notes),
                       tuple(readings) if len(readings) > 1 else ())  # fmt: skip
 
@@ -120,10 +121,11 @@ def _spans(row: Sensor, size: TaggedSize) -> tuple[list[float], tuple[Note, ...]
 
 
 def _by_equivalent(photo: Photo, row: Sensor, size: TaggedSize, f_px: list[float], u: float) -> _Told | str:
-    """The digital zoom that the equivalent tells of, or why it contradicts the row."""
+    """Which readings fit the equivalent, and the digital zoom that it tells of; or why it contradicts the row."""
     found = [one for one in (compared(photo, size, f, u) for f in f_px) if one is not None]
-    if not found or any(one.agrees for one in found):
-        return _Told()
+    fitting = [f for f, one in zip(f_px, found, strict=False) if one.agrees]
+    if not found or fitting:
+        return _Told(fitting or f_px)
     nearest: Comparison = min(found, key=lambda one: abs(math.log(one.factor)))
     f35 = photo.metadata.f35_mm or 0.0
     sure = row.focal_mm is not None or row.f_number is not None
@@ -131,7 +133,7 @@ def _by_equivalent(photo: Photo, row: Sensor, size: TaggedSize, f_px: list[float
         text = (f"an equivalent of {f35:g} mm is {nearest.factor:.2f} times that of this lens: taken with a digital zoom, "
                 "or cropped by the camera; the focal length is corrected by it")  # fmt: skip
         note = Note("digital_zoom", text, "take the picture without digital zoom")
-        return _Told(nearest.factor, ZOOMED_U, (note,))
+        return _Told(f_px, nearest.factor, ZOOMED_U, (note,))
     return (f"{row.title}: the sensor's width makes the equivalent {f35 / nearest.factor:.3g} mm, and the metadata "
             f"says {f35:g} mm")  # fmt: skip
 
