@@ -9,7 +9,19 @@ SOURCE = Path(__file__).parent.parent / "src" / "subtense"
 WAYS = {"camera_sources", "detectors", "methods", "reports"}
 FACES = {"cli", "web", "batch"}
 BASE = {"errors", "arrays", "distribution", "quantity", "noun", "space", "propagate", "geometry", "method"}
-HEAVY = {"cv2", "scipy", "PIL", "pillow_heif", "rawpy", "reportlab", "tomllib", "defusedxml", "matplotlib", "lensfunpy", "pycolmap"}
+HEAVY = {
+    "cv2",
+    "scipy",
+    "PIL",
+    "pillow_heif",
+    "rawpy",
+    "reportlab",
+    "tomllib",
+    "defusedxml",
+    "matplotlib",
+    "lensfunpy",
+    "pycolmap",
+}
 ALLOWED = {"numpy", "click", *HEAVY}
 
 

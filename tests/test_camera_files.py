@@ -559,7 +559,11 @@ def test_a_lens_that_folds_over_inside_of_the_picture_is_refused():
     assert read(text.replace("-0.4", "-0.05")).camera.f_px == 300
     corners = read(text.replace("-0.4", "-0.2"))
     assert [n.code for n in corners.notes] == ["distortion_folds"]
-    assert corners.camera.invertible(np.array([[0.0, 0.0], [320.0, 240.0], [320.0, 20.0]])).tolist() == [False, True, True]
+    assert corners.camera.invertible(np.array([[0.0, 0.0], [320.0, 240.0], [320.0, 20.0]])).tolist() == [
+        False,
+        True,
+        True,
+    ]
     wide = SIZE + "fisheye_model: 1\nK: [150, 0, 320, 0, 150, 240, 0, 0, 1]\nD: [{}, 0, 0, 0]"
     assert read(wide.format(-0.05)).camera.invertible(np.array([[0.0, 0.0]])).tolist() == [
         False

@@ -84,7 +84,9 @@ class Board:
             x = 2 * x + y % 2
         if self.kind == "aprilgrid":
             x, y = (i // 2 + (i % 2) * self.marker_m / self.square_m for i in (x, y))
-        return np.column_stack([x, y, np.zeros_like(x)]) * self.square_m
+        points = np.column_stack([x, y, np.zeros_like(x)]) * self.square_m
+        points.flags.writeable = False  # kept, and shared by all who ask
+        return points
 
     @property
     def width_m(self) -> float:

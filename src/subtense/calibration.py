@@ -151,8 +151,8 @@ class Audit:
 def doubts(checks: tuple[Check, ...]) -> tuple[Note, ...]:
     """The notes of checks that did not pass: one for the model, with all that it rests on, and one for each other kind."""
     wrong = [c for c in checks if not c.passed]
-    model = [c for c in wrong if c.code == "model_error"]
-    notes = [Note(c.code, c.found, c.cure) for c in wrong if c.code != "model_error"]
+    model = [c for c in wrong if c.note is None]
+    notes = [c.note for c in wrong if c.note is not None]
     if model:
         text = "; ".join(c.found for c in model) + "; the uncertainty holds what this showed"
         notes.insert(0, Note("model_error", text, "; ".join(dict.fromkeys(c.cure for c in model))))

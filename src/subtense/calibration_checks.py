@@ -15,9 +15,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .adjustment import LENS_MODELS, RATIONAL, WARM, Adjusted, LensModel, Problem, State, adjust, inverse, reduced
+from .adjustment import (
+    LENS_MODELS,
+    RATIONAL,
+    WARM,
+    Adjusted,
+    LensModel,
+    Problem,
+    State,
+    adjust,
+    inverse,
+    projection,
+    reduced,
+)
 from .arrays import Array, Indices
 from .errors import GeometryError
+from .quantity import Note
 
 LEVEL = 0.002
 """How often each check may raise a false alarm."""
@@ -59,7 +72,7 @@ class Check:
         passed: whether all is well.
         found: what was seen, in words and numbers.
         cure: what to do if not.
-        code: of the note where it did not pass.
+        note: the note where it did not pass; None for a part of the one on the model.
         extra_cov: what it adds to the covariance of all global unknowns; None for nothing.
         noise_factor: by how much the noise seems larger than the residuals say, as far as the camera goes.
         better: a solution that the check found better; None for none.
@@ -70,7 +83,7 @@ class Check:
     passed: bool
     found: str
     cure: str = ""
-    code: str = "model_error"
+    note: Note | None = None
     extra_cov: Array | None = field(default=None, compare=False, repr=False)
     noise_factor: float = 1.0
     better: Adjusted | None = field(default=None, compare=False, repr=False)
@@ -125,17 +138,45 @@ def _starts(problem: Problem, start: State) -> tuple[State, ...]:
     return (start, replace(start, intrinsics=plain))
 
 
-def _shift(solution: Adjusted, richer: Adjusted) -> Array:
-    """How far the global unknowns move to the richer solution, in the solution's own order."""
-    found = []
-    for index, own in enumerate(solution.state.intrinsics):
-        other = richer.state.intrinsics[index][: own.size]
-        found.append(other - own)
+def _shift(solution: Adjusted, other: Adjusted) -> Array:
+    """How far the global unknowns move to another solution of the same lens models."""
+    intrinsics = [b - a for a, b in zip(solution.state.intrinsics, other.state.intrinsics, strict=True)]
+    return np.concatenate([*intrinsics, _shift_of_poses(solution, other), other.state.warp_m - solution.state.warp_m])
+
+
+def _as_seen(solution: Adjusted, richer: Adjusted) -> Array:
+    """How far the global unknowns of the leaner model would move for its cameras to look as the richer ones where points were seen.
+
+    Coefficients of unlike models can't be subtracted, directions can: pixels of the richer camera's directions are explained by
+    the leaner model's numbers and a turn of the camera.
+    """
+    shift = np.zeros(solution.problem.size)
+    for index, model in enumerate(solution.problem.models):
+        block, theta = solution.problem.blocks[index], solution.state.intrinsics[index]
+        seen = block.seen_px[block.weight > 0]
+        rays = richer.camera(index).rays(seen)
+        pixels, inner, outer = projection(model.lens, theta, rays, model.free)
+        first = solution.first(index)
+        own = [i for i in range(theta.size) if first + i in solution.problem.free]
+        columns = np.concatenate([inner[..., own], np.cross(rays[:, None, :], outer)], -1)
+        good = np.isfinite(pixels).all(1) & np.isfinite(columns).all((1, 2))
+        found = np.linalg.lstsq(columns[good].reshape(-1, len(own) + 3), (seen - pixels)[good].reshape(-1), rcond=None)[
+            0
+        ]
+        shift[[first + i for i in own]] = found[: len(own)]
+    at = solution.first(len(solution.problem.models))
+    moved = _shift_of_poses(solution, richer)
+    shift[at : at + moved.size] = moved
+    return shift
+
+
+def _shift_of_poses(solution: Adjusted, richer: Adjusted) -> Array:
+    """Of the relative poses: rotation vectors and translations."""
+    found = [np.zeros(0)]
     for own_pose, pose in zip(solution.state.relative, richer.state.relative, strict=True):
         turn = pose.rotation @ own_pose.rotation.T
         vector = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
         found += [vector, pose.translation_m - own_pose.translation_m]
-    found.append(richer.state.warp_m - solution.state.warp_m)
     return np.concatenate(found)
 
 
@@ -150,19 +191,20 @@ def lens_check(solution: Adjusted) -> Check | None:
         np.concatenate([i, np.zeros(4 + m.count - i.size)])
         for i, m in zip(solution.state.intrinsics, richer_models, strict=True)))  # fmt: skip
     found = _better(solution, problem, start)
-    names = ", ".join(dict.fromkeys(m.name for m in solution.problem.models))
-    other = ", ".join(dict.fromkeys(m.name for m in richer_models))
+    names = " and ".join(dict.fromkeys(m.name for m in solution.problem.models))
+    advised = list(dict.fromkeys(ADVISED.get(m.name, m.name) for m in richer_models))
+    other = "a lens with more terms" if HIGHER in richer_models else " and ".join(advised)
     if found is None or found[1] >= LEVEL:
         return Check("lens model", True, f"{other} explains no more than {names}")
     richer = found[0]
-    shift = _shift(solution, richer)
+    shift = _as_seen(solution, richer)
     text = (f"{other} explains the pictures better than {names} (rms {richer.rms_px:.3f} against {solution.rms_px:.3f} px); "
             f"it moves the focal length by {shift[0]:+.2f} px")  # fmt: skip
     return Check(
         "lens model",
         False,
         text,
-        f"calibrate with --model {ADVISED.get(other, other)}",
+        f"calibrate with --model {advised[-1]}",
         extra_cov=np.outer(shift, shift),
     )
 
@@ -327,18 +369,18 @@ def ranges_m(solution: Adjusted) -> Array:
 def tilt_check(solution: Adjusted) -> Check:
     """Whether the board was tilted: seen from the front only, focal length and range can't be told apart."""
     tilts = tilts_rad(solution)
-    enough = int((tilts > ENOUGH_TILT_RAD).sum())
     text = f"tilts from {np.degrees(tilts.min()):.0f} to {np.degrees(tilts.max()):.0f} degrees"
-    return Check("tilt of the board", enough >= TILTED_VIEWS, text, "take pictures with the board tilted by 30 to 45 degrees, "
-                 "to each of its four sides", "frontal_views")  # fmt: skip
+    cure = "take pictures with the board tilted by 30 to 45 degrees, to each of its four sides"
+    passed = int((tilts > ENOUGH_TILT_RAD).sum()) >= TILTED_VIEWS
+    return Check("tilt of the board", passed, text, cure, Note("frontal_views", text, cure))
 
 
 def range_check(solution: Adjusted) -> Check:
     """Whether the board was near and far."""
     ranges = ranges_m(solution)
-    text = f"ranges from {ranges.min():.3g} to {ranges.max():.3g} m"
-    return Check("range of the board", bool(ranges.max() > ENOUGH_SPREAD * ranges.min()), text,
-                 "take some pictures from twice as far", "single_range")  # fmt: skip
+    text, cure = f"ranges from {ranges.min():.3g} to {ranges.max():.3g} m", "take some pictures from twice as far"
+    passed = bool(ranges.max() > ENOUGH_SPREAD * ranges.min())
+    return Check("range of the board", passed, text, cure, Note("single_range", text, cure))
 
 
 def coverage_check(solution: Adjusted, columns: int = 5, rows: int = 4) -> Check:
@@ -347,12 +389,13 @@ def coverage_check(solution: Adjusted, columns: int = 5, rows: int = 4) -> Check
     for (_, _, seen), (width, height) in zip(_standardised(solution), solution.problem.sizes_px, strict=True):
         cells = np.unique(_cell(seen, width, height, columns, rows)).size
         worst = min(worst, cells / (columns * rows))
-    return Check("coverage of the picture", worst >= COVERAGE, f"points in {worst:.0%} of the picture".replace("%", " %"),
-                 "take pictures with the board near the corners and edges of the picture", "low_coverage")  # fmt: skip
+    text = f"points in {worst:.0%} of the picture".replace("%", " %")
+    cure = "take pictures with the board near the corners and edges of the picture"
+    return Check("coverage of the picture", worst >= COVERAGE, text, cure, Note("low_coverage", text, cure))
 
 
 def count_check(solution: Adjusted) -> Check:
     """Whether there are enough pictures."""
     frames = solution.problem.frames
-    return Check("number of pictures", frames >= FEW_VIEWS, f"{frames} places of the board",
-                 f"take {FEW_VIEWS} or more, 20 are good", "few_views")  # fmt: skip
+    text, cure = f"{frames} places of the board", f"take {FEW_VIEWS} or more, 20 are good"
+    return Check("number of pictures", frames >= FEW_VIEWS, text, cure, Note("few_views", text, cure))

@@ -214,8 +214,8 @@ def _line_distances(rig: Rig, left_px: Array, right_px: Array) -> Array:
 def verdict(calibration: Calibration) -> Verdict:
     """The first thing to say: may I use it, and for what."""
     failed = [c for c in calibration.checks if not c.passed]
-    model = ", ".join(dict.fromkeys(c.name for c in failed if c.code == "model_error"))
-    gaps = ", ".join(dict.fromkeys(c.name for c in failed if c.code != "model_error"))
+    model = ", ".join(dict.fromkeys(c.name for c in failed if c.note is None))
+    gaps = ", ".join(dict.fromkeys(c.name for c in failed if c.note is not None))
     weak = (f"Weak: {gaps}.",) if gaps else ()
     if model or not calibration.trusted:
         why = f" ({model})" if model else ""
@@ -313,5 +313,5 @@ def bow_text(calibration: Calibration) -> str:
 
 def other_notes(calibration: Calibration) -> tuple[Note, ...]:
     """Notes that the checks, the table of pictures and the sentence on lengths do not hold already."""
-    codes = {c.code for c in calibration.checks if not c.passed} | set(TOLD_ELSEWHERE)
+    codes = {c.note.code if c.note else "model_error" for c in calibration.checks if not c.passed} | set(TOLD_ELSEWHERE)
     return tuple(n for n in calibration.notes if n.code not in codes)

@@ -51,10 +51,10 @@ def draw(camera, pose, board=BOARD, samples=2):
     return np.repeat(np.round(255 * encoded).astype(np.uint8)[..., None], 3, axis=2)
 
 
-def write(folder, camera=CAMERA, count=len(POSES), start=0, move=None):
+def write(folder, camera=CAMERA, move=None):
     """Pictures shot00.png, shot01.png, ... in a folder; `move` is camera_from_first of a second camera."""
     paths = []
-    for i, pose in enumerate(POSES[start : start + count]):
+    for i, pose in enumerate(POSES):
         first = camera_from_board(*pose)
         if move is not None:
             first = Pose(move.rotation @ first.rotation, move.rotation @ first.translation_m + move.translation_m)

@@ -35,7 +35,7 @@ def scene(rng, lens="brown_conrady", intrinsics=None, *, board=CHESSBOARD, size_
         told: the sigma the views carry; the noise itself if None.
     """
     theta = true_intrinsics() if intrinsics is None else np.asarray(intrinsics, float)
-    points = board.points_m - board.points_m.mean(0)
+    points = board.points_m - board.points_m.mean(0)  # a copy
     half = np.ptp(points, axis=0)[:2] / 2
     points[:, 2] = (1 - (points[:, :2] / half) ** 2) @ np.asarray(warp_m)
     camera = Camera(*size_px, theta[0], theta[2], theta[3], theta[1], lens, theta[4:])

@@ -56,7 +56,9 @@ class Calc(_Evaluated):
 class Calibration(_Body):
     """A calibration file, sent."""
 
-    name: Annotated[str, Field(max_length=255, description="what the file lacks may stand behind a #: calib.yml#640x480")]
+    name: Annotated[
+        str, Field(max_length=255, description="what the file lacks may stand behind a #: calib.yml#640x480")
+    ]
     content: Annotated[str, Field(description="the file's text, in any format of calibration files that is one")]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..calibration import Calibration
-from ..errors import InputError
+from ..errors import InputError, MissingExtraError
 from ..whole_file import write_whole
 
 
@@ -18,13 +18,11 @@ def camera_file(calibration: Calibration, path: Path) -> str:
     Raises:
         InputError: the format can't hold it, or the file can't be written.
     """
-    import json
-
     from ..camera_files import formats
     from ..camera_files.reading import Found
 
     if path.suffix.lower() == ".json":
-        write_whole(path, json.dumps(calibration.to_json(), indent=1, allow_nan=False) + "\n", "--output")
+        write_whole(path, _json(calibration), "--output")
         return ""
     if calibration.rig is not None:
         raise InputError("--output", str(path), "two cameras are written as .json only")
@@ -41,16 +39,33 @@ def report_file(calibration: Calibration, path: Path) -> None:
     Raises:
         InputError: another ending, or the file can't be written.
     """
+    check_report(path)
+    ways = {".html": _html, ".txt": _text, ".json": _json}
+    write_whole(path, ways[path.suffix.lower()](calibration), "--report")
+
+
+def _html(calibration: Calibration) -> str:
+    """With pictures where their extra is installed; the page says so where it is not."""
+    from ..reports.calibration_html import html
+    from ..reports.calibration_plots import plots
+
+    try:
+        drawn = plots(calibration)
+    except MissingExtraError:
+        drawn = ()
+    return html(calibration, drawn)
+
+
+def _text(calibration: Calibration) -> str:
+    from ..reports.calibration_text import text
+
+    return text(calibration) + "\n"
+
+
+def _json(calibration: Calibration) -> str:
     import json
 
-    from ..reports import calibration_html, calibration_text
-
-    ways = {
-        ".html": lambda: calibration_html.html(calibration), ".txt": lambda: calibration_text.text(calibration) + "\n",
-        ".json": lambda: json.dumps(calibration.to_json(), indent=1, allow_nan=False) + "\n",
-    }  # fmt: skip
-    check_report(path)
-    write_whole(path, ways[path.suffix.lower()](), "--report")
+    return json.dumps(calibration.to_json(), indent=1, allow_nan=False) + "\n"
 
 
 def check_report(path: Path) -> None:
