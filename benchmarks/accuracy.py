@@ -14,6 +14,7 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "tests" / "synthetic"))
 sys.path.insert(0, str(ROOT / "tests"))
 
+import calibrations  # noqa: E402
 import test_coverage as coverage  # noqa: E402
 import test_real_pictures as real  # noqa: E402
 
@@ -23,6 +24,8 @@ from subtense.observation import Observation  # noqa: E402
 
 PAGE = ROOT / "docs" / "accuracy.md"
 DATA = ROOT.parent / "shared" / "data"
+REPEATS = 200
+"""Of simulated calibrations."""
 Row = tuple[str, ...]
 
 
@@ -118,6 +121,69 @@ def focal_lengths() -> list[Row]:
     return rows
 
 
+def calibration_spread() -> list[Row]:
+    """Stated over observed standard deviation of each intrinsic number."""
+    rows: list[Row] = [("lens model", "number", "stated u", "spread seen", "stated / seen")]
+    for name in calibrations.LENSES:
+        for what, stated, seen in zip(*calibrations.spreads(name, REPEATS), strict=True):
+            rows.append((name, what, f"{stated:.3g}", f"{seen:.3g}", f"{stated / seen:.2f}"))
+        print(rows[-1], flush=True)
+    return rows
+
+
+def calibration_faults() -> list[Row]:
+    """What is noticed, and whether the interval of the focal length holds the truth."""
+    rows: list[Row] = [
+        ("fault", "any note", "the right note", "interval holds the truth", "mean error of f", "mean u of f")
+    ]
+    for name in calibrations.FAULTS:
+        found = calibrations.score(name, REPEATS)
+        rightly = "-" if name.startswith("none") else percent(found.rightly)
+        rows.append(
+            (
+                name,
+                percent(found.noted),
+                rightly,
+                percent(found.covered),
+                f"{found.bias_px:+.2f} px",
+                f"{found.u_px:.2f} px",
+            )
+        )
+        print(rows[-1], flush=True)
+    return rows
+
+
+def calibration_real() -> list[Row]:
+    """Real sets of pictures with the default options."""
+    from subtense.board import Board
+    from subtense.workflow.calibrate import calibrate, calibrate_rig
+
+    folder = DATA / "calibration"
+    chess, charuco = Board("chessboard", 10, 7, 0.025), Board("charuco", 8, 8, 0.0254, 0.01905, "4x4_1000")
+    left, right = (sorted((folder / "opencv_stereo_chess").glob(f"{side}*.jpg")) for side in ("left", "right"))
+    rows: list[Row] = [("pictures", "used", "model", "rms", "f", "95 %", "others say")]
+    for name, paths, board, others in (
+        ("OpenCV, left", left, chess, "rms 0.195 px, f 532.8 px"),
+        ("LifeCam, ChArUco", sorted((folder / "charuco_1280").glob("*.jpg")), charuco, "rms 0.250 px, f 1127.5 px"),
+        (
+            "LifeCam, chessboard",
+            sorted((folder / "chess_480").glob("*.png")),
+            Board("chessboard", 11, 11, 0.0254),
+            "f 705.3 px",
+        ),
+    ):
+        found = calibrate(paths, board)
+        f, half = float(found.camera.f_px), 1.96 * found.camera.u_f_px
+        rows.append((name, f"{len(found.used)} of {len(paths)}", found.models[0], f"{found.solution.rms_px:.3f} px", f"{f:.1f} px",
+                     f"{f - half:.1f} to {f + half:.1f} px", others))  # fmt: skip
+    found = calibrate_rig(left, right, chess)
+    assert found.rig is not None
+    b, half = 1000 * found.rig.baseline_m, 1960 * found.rig.u_baseline_m
+    rows.append(("OpenCV, stereo baseline", f"{len(found.used)} of {2 * len(left)}", found.models[0], f"{found.solution.rms_px:.3f} px",
+                 f"{b:.2f} mm", f"{b - half:.2f} to {b + half:.2f} mm", "83.4 mm"))  # fmt: skip
+    return rows
+
+
 def table(rows: list[Row]) -> str:
     """Rows as a Markdown table."""
     head, *body = ("| " + " | ".join(row) + " |" for row in rows)
@@ -141,7 +207,10 @@ def main() -> None:
         put("focal", focal_lengths())
         with tempfile.TemporaryDirectory() as folder:
             put("april_vision", april_vision(Path(folder)))
+        put("calibration_real", calibration_real())
     put("simulated", simulated())
+    put("calibration_spread", calibration_spread())
+    put("calibration_faults", calibration_faults())
 
 
 if __name__ == "__main__":
