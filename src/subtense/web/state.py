@@ -64,7 +64,7 @@ def camera_for(state: State, photo: Held, given: str | Calibration | None) -> Re
             else given or None
         )
         try:
-            found: Resolved | UnknownCameraError = resolve_camera(photo.photo, sent, paths=False)
+            found: Resolved | UnknownCameraError = resolve_camera(photo.photo, sent, paths=False, ask_all=True)
         except UnknownCameraError as error:
             found = error
         except InputError as error:
