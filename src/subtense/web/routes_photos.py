@@ -145,7 +145,7 @@ def post_camera(request: Request, body: models.OfPhoto, form: Format = "json") -
     Where nothing tells the camera, `camera` is null, and the note `unknown_camera` says what was tried and what to give.
     """
     photo = held(request, body.photo)
-    found = camera_for(state_of(request), photo, body.camera)
+    found = camera_for(state_of(request), photo, body.camera, ask_all=True)
     if isinstance(found, UnknownCameraError):
         return shown(no_camera_document(photo.photo, found), form, photo.photo)
     return shown(camera_document(photo.photo, found), form, photo.photo)

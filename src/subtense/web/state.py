@@ -46,8 +46,10 @@ def held(request: Request, photo: str) -> Held:
     return found
 
 
-def camera_for(state: State, photo: Held, given: str | Calibration | None) -> Resolved | UnknownCameraError:
-    """The photo's camera, or why there is none; a text never names a file of this machine.
+def camera_for(
+    state: State, photo: Held, given: str | Calibration | None, *, ask_all: bool = False
+) -> Resolved | UnknownCameraError:
+    """The photo's camera, or why there is none; a text never names a file of this machine. `ask_all` as in `resolve_camera`.
 
     Raises:
         InputError, FileFormatError: `given` can't be used.
@@ -56,7 +58,7 @@ def camera_for(state: State, photo: Held, given: str | Calibration | None) -> Re
     most = state.settings.limits.calibration_bytes
     if isinstance(given, Calibration) and len(given.content.encode()) > most:
         raise LimitError("calibration_bytes", f"the calibration file is larger than {most} bytes (calibration_bytes)")
-    key = sha256(repr(given).encode()).hexdigest()
+    key = sha256(repr((given, ask_all)).encode()).hexdigest()
     if key not in photo.cameras:
         sent = (
             SentFile(shown_name(given.name), given.content.encode())
@@ -64,7 +66,7 @@ def camera_for(state: State, photo: Held, given: str | Calibration | None) -> Re
             else given or None
         )
         try:
-            found: Resolved | UnknownCameraError = resolve_camera(photo.photo, sent, paths=False, ask_all=True)
+            found: Resolved | UnknownCameraError = resolve_camera(photo.photo, sent, paths=False, ask_all=ask_all)
         except UnknownCameraError as error:
             found = error
         except InputError as error:
