@@ -133,7 +133,9 @@ def test_verdict_goes_by_the_checks():
     passed = tuple(replace(c, passed=True) for c in calibration("good").checks)
     good = replace(calibration("good"), checks=passed, notes=())
     assert verdict(good).grade == "good"
-    gaps = replace(good, checks=tuple(replace(c, passed=c.note is None or c.note.code != "low_coverage") for c in passed))
+    gaps = replace(
+        good, checks=tuple(replace(c, passed=c.note is None or c.note.code != "low_coverage") for c in passed)
+    )
     assert verdict(gaps).grade == "gaps" and verdict(gaps).sentences[-1] == "Weak: coverage of the picture."
     assert verdict(calibration("bowed")).grade == "doubtful"
     assert "board flatness" in verdict(calibration("bowed")).sentences[0]

@@ -62,12 +62,14 @@ class Decoded:
         height_px: its height.
         orientation: the EXIF orientation that is still to be applied; 1 where the decoder has applied it.
         rows: the pixels.
+        single: whether they are one channel, kept as one and seen three times.
     """
 
     width_px: int
     height_px: int
     orientation: int
     rows: Rows
+    single: bool = False
 
 
 @dataclass(frozen=True)
@@ -111,20 +113,23 @@ class Opened:
     decode: Callable[[], Decoded]
 
 
-def open_picture(data: bytes, label: object, ending: str = "") -> Opened:
+def open_picture(data: bytes, label: object, ending: str = "", *, gray: bool = False) -> Opened:
     """Read a picture's head.
 
     Args:
         data: the file.
         label: what it is called in an error.
         ending: of its name, ".dng"; a hint.
+        gray: whether the luma of a colour JPEG will do, which is quicker to decode.
 
     Raises:
         FileFormatError: no picture, a damaged one, or a decoder too old for a stranger's file.
         MissingExtraError: its decoder is not installed.
     """
     form = _form(data, ending.lower())
-    return {"HEIC": _open_heic, "RAW": _open_raw, "": _open_other}[form](data, label)
+    if form == "":
+        return _open_other(data, label, gray=gray)
+    return {"HEIC": _open_heic, "RAW": _open_raw}[form](data, label)
 
 
 def upright(decoded: Decoded, label: object, pixels: Buffer | None = None) -> Pixels:
@@ -135,14 +140,15 @@ def upright(decoded: Decoded, label: object, pixels: Buffer | None = None) -> Pi
     """
     size = (decoded.height_px, decoded.width_px)
     height, width = size[::-1] if decoded.orientation >= 5 else size
-    out = _array(pixels, height, width, label)
+    single = decoded.single and pixels is None
+    out = np.empty((height, width, 1), np.uint8) if single else _array(pixels, height, width, label)
     stored = as_stored(out, decoded.orientation)
     rows_at_once = max(1, STRIP_PIXELS // decoded.width_px)
     with _guarded(label):
         for top in range(0, decoded.height_px, rows_at_once):
             bottom = min(top + rows_at_once, decoded.height_px)
             stored[top:bottom] = decoded.rows(top, bottom)
-    return out
+    return np.broadcast_to(out, (height, width, 3)) if single else out
 
 
 @contextmanager
@@ -240,24 +246,28 @@ def _size_px(picture: Any) -> tuple[int, int]:
 
 
 _PILLOW = threading.Lock()
+_IN_USE: list[int | None] = []
+"""Pillow's own limit, once for each thread that works without it."""
 
 
 @contextmanager
 def _pillow_without_its_own_limit() -> Iterator[Any]:
-    """Pillow with our limit on pixels in place of its own; its limit is a global, so it is put back."""
+    """Pillow with our limit on pixels in place of its own; that is a global, so the last one out puts it back."""
     from PIL import Image
 
     with _PILLOW:
-        own, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                yield Image
-        finally:
-            Image.MAX_IMAGE_PIXELS = own
+        _IN_USE.append(_IN_USE[0] if _IN_USE else Image.MAX_IMAGE_PIXELS)
+        Image.MAX_IMAGE_PIXELS = None
+    try:
+        yield Image
+    finally:
+        with _PILLOW:
+            own = _IN_USE.pop()
+            if not _IN_USE:
+                Image.MAX_IMAGE_PIXELS = own
 
 
-def _open_other(data: bytes, label: object) -> Opened:
+def _open_other(data: bytes, label: object, *, gray: bool = False) -> Opened:
     with _pillow_without_its_own_limit() as Image:
         try:
             picture = Image.open(io.BytesIO(data), formats=FORMATS)
@@ -266,12 +276,15 @@ def _open_other(data: bytes, label: object) -> Opened:
             raise FileFormatError(label, reason, code="partial_file" if "damaged" in reason else None) from None
 
     def decode() -> Decoded:
+        if gray and picture.format == "JPEG":
+            picture.draft("L", picture.size)  # the luma alone, as it is stored
         with _pillow_without_its_own_limit(), _guarded(label):
             picture.load()
         # Pillow turns a TIFF itself, and takes the tag away: what is left of it is still to be applied
         left = (_exif_tags(picture) or {}).get(0x0112, 1)
         orientation = left if left in range(1, 9) else 1
-        return Decoded(*_size_px(picture), orientation, lambda top, bottom: _strip(picture, top, bottom))
+        single = gray and picture.mode == "L"
+        return Decoded(*_size_px(picture), orientation, lambda top, bottom: _strip(picture, top, bottom), single)
 
     form = "JPEG" if picture.format == "MPO" else str(picture.format)  # an MPO is a JPEG with others behind it
     return Opened(form, *_size_px(picture), lambda: _exif_tags(picture), lambda: _beside(picture, data), decode)
@@ -325,9 +338,11 @@ def _strip(picture: Any, top: int, bottom: int) -> Pixels:
 
 
 def _rgb(picture: Any) -> Pixels:
-    """A Pillow picture of any mode as (height, width, 3) uint8, or (height, width, 1) for 16 bits."""
+    """A Pillow picture of any mode as (height, width, 3) uint8, or (height, width, 1) for gray without transparency."""
     if picture.mode.startswith("I"):  # 16 bits a sample
         return (np.asarray(picture, np.int64) >> 8).clip(0, 255).astype(np.uint8)[..., None]
+    if picture.mode == "L" and "transparency" not in picture.info:
+        return np.asarray(picture)[..., None]
     if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
         from PIL import Image
 

@@ -79,7 +79,7 @@ class Photo:
 
     @classmethod
     def load(cls, path: str | Path, *, name: str | None = None, pixels: Buffer | None = None,
-             most_pixels: int = MOST_PIXELS) -> Photo:  # fmt: skip
+             most_pixels: int = MOST_PIXELS, gray: bool = False) -> Photo:  # fmt: skip
         """Read a picture: JPEG, PNG, TIFF, WebP, BMP, AVIF; HEIC with the extra `heic`, a camera's RAW with the extra `raw`.
 
         Args:
@@ -88,6 +88,7 @@ class Photo:
             pixels: gives the array to decode into, from height and width in px of the upright picture: writable, uint8,
                 (height, width, 3). A `numpy.memmap`, say, so that another process has the pixels.
             most_pixels: more are refused.
+            gray: whether gray will do: of a JPEG the luma alone is decoded, and `pixels` is one channel seen three times.
 
         Raises:
             FileFormatError: no such file, a folder, no picture, a cut picture, or one over the limits.
@@ -98,7 +99,7 @@ class Photo:
         shown = _shown(name) or path.name
         label: object = path if name is None else shown
         data = file_bytes(path, label)
-        opened = open_picture(data, label, Path(name or path).suffix)
+        opened = open_picture(data, label, Path(name or path).suffix, gray=gray)
         check_size(label, opened.width_px, opened.height_px, most_pixels)
         tags = opened.tags()  # before the pixels are decoded: turning them takes the orientation away
         decoded = opened.decode()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from boards import CHESSBOARD, USUAL, scene, true_intrinsics
 
+from subtense.errors import GeometryError
 from subtense.workflow.calibrate import calibrate_views
 
 LENSES = {
@@ -52,7 +53,8 @@ def calibrated(fault: Fault, rng):
 
 @dataclass(frozen=True)
 class Score:
-    """Of many repeats of one fault: shares of those that raise a note, the right note, and whose interval of f holds the truth."""
+    """Of many repeats of one fault: shares of those that raise a note (or are refused), the right note, and, of those with an
+    answer, whose interval of f holds the truth."""
 
     noted: float
     rightly: float
@@ -67,11 +69,15 @@ def score(name: str, repeats: int, seed: int = 7) -> Score:
     truth = fault.truth.get("intrinsics", true_intrinsics())[0]
     rows = []
     for _ in range(repeats):
-        found = calibrated(fault, rng)
+        try:
+            found = calibrated(fault, rng)
+        except GeometryError:  # refused: no number that could be wrong; only what was to be noted may be
+            rows.append((True, bool(fault.notes), np.nan, np.nan, np.nan))
+            continue
         codes = {n.code for n in found.notes}
         f, u = float(found.camera.f_px), found.camera.u_f_px
         rows.append((bool(codes), fault.notes <= codes, abs(f - truth) < 1.96 * u, f - truth, u))
-    noted, rightly, covered, bias, u = np.mean(rows, axis=0)
+    noted, rightly, covered, bias, u = np.nanmean(np.array(rows, float), axis=0)
     return Score(noted, rightly, covered, bias, u)
 
 

