@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -286,14 +286,15 @@ def chosen_model(
 ) -> tuple[Adjusted, dict[str, float]]:
     """The leanest model that foretells pictures it has not seen as well as the best one does, and the rms of each.
 
-    Each fold's pictures are explained by a camera from the others, with only their boards' places free.
+    Each fold's pictures are explained by a camera from the others, with only their boards' places free. A model that does not
+    explain what it has seen better than a leaner one is not asked to foretell.
     """
     errors: dict[str, Array] = {}
     fitted: dict[str, Adjusted] = {}
     for name in names:
         try:
             tried = _with_model(solution, LENS_MODELS[name])
-            if _turns_back(tried.camera()):
+            if _turns_back(tried.camera()) or _no_better(tried, fitted):
                 continue
             fitted[name], errors[name] = tried, _foretold(tried, folds)
         except GeometryError:
@@ -308,6 +309,11 @@ def chosen_model(
             best = name
             break
     return fitted[best], {name: float(np.sqrt(2 * m)) for name, m in means.items()}
+
+
+def _no_better(tried: Adjusted, fitted: Mapping[str, Adjusted]) -> bool:
+    """Whether a leaner model explains the pictures as well already."""
+    return any(tried.chi2 > (1 - NO_BETTER) * leaner.chi2 for leaner in list(fitted.values())[:1])
 
 
 def _turns_back(camera: Camera) -> bool:
