@@ -11,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import calc
+import calibration
 import monte_carlo
 import pictures
 import rows
@@ -20,7 +21,7 @@ from comparison import Comparison, table
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "docs" / "benchmarks.md"
 BEGIN, END = "<!-- benchmarks: begin -->", "<!-- benchmarks: end -->"
-ALL = {"startup": startup, "calc": calc, "monte_carlo": monte_carlo, "rows": rows, "pictures": pictures}
+ALL = {"startup": startup, "calc": calc, "monte_carlo": monte_carlo, "rows": rows, "pictures": pictures, "calibration": calibration}
 
 
 def main() -> None:

@@ -45,7 +45,9 @@ def codes(found):
 def test_a_calibration_of_the_stored_picture_is_turned_with_it(take, orientation, turns):
     photo = take(orientation)
     found = resolve_camera(photo, of(**({"frame": "stored"} if orientation == 3 else {})))
-    assert codes(found) == ["calibration_turned"]
+    assert codes(found) == (
+        [] if orientation == 3 else ["calibration_turned"]
+    )  # the file itself says so, or it is told
     row, column = np.argwhere(photo.pixels[..., 0] == 255)[0]
     x, y, z = CAMERA.rays(np.array([SPOT], float))[0]
     for _ in range(turns):

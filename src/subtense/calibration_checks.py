@@ -30,6 +30,7 @@ from .adjustment import (
 )
 from .arrays import Array, Indices
 from .errors import GeometryError
+from .geometry import Pose
 from .quantity import Note
 
 LEVEL = 0.002
@@ -116,8 +117,6 @@ def checks_of(solution: Adjusted) -> tuple[Check, ...]:
 
 def _better(solution: Adjusted, problem: Problem, start: State) -> tuple[Adjusted, float] | None:
     """The richer solution and the probability that noise alone makes it so much better; None where it can't be had."""
-    from scipy.stats import f as fisher
-
     found = []
     for begin in _starts(problem, start):
         with suppress(GeometryError):
@@ -125,9 +124,16 @@ def _better(solution: Adjusted, problem: Problem, start: State) -> tuple[Adjuste
     if not found:
         return None
     richer = min(found, key=lambda a: a.chi2)
+    return richer, by_chance(solution, richer)
+
+
+def by_chance(solution: Adjusted, richer: Adjusted) -> float:
+    """The probability that noise alone makes a richer solution so much better (F-test)."""
+    from scipy.stats import f as fisher
+
     more = solution.dof - richer.dof
     statistic = (solution.chi2 - richer.chi2) / more / (richer.chi2 / richer.dof)
-    return richer, float(fisher.sf(statistic, more, richer.dof))
+    return float(fisher.sf(statistic, more, richer.dof))
 
 
 def _starts(problem: Problem, start: State) -> tuple[State, ...]:
@@ -355,15 +361,24 @@ def _distance(a: Adjusted, b: Adjusted) -> float:
 # -- the pictures themselves --------------------------------------------------------------------------------------------
 
 
-def tilts_rad(solution: Adjusted) -> Array:
-    """(frames,) angle between the board and the image plane of the first camera."""
-    return np.asarray(np.arccos(np.clip(abs(solution.state.boards.rotation[:, 2, 2]), 0, 1)))
+def boards_of(solution: Adjusted, camera: int = 0) -> Pose:
+    """camera_from_board of all frames."""
+    boards = solution.state.boards
+    if camera == 0:
+        return boards
+    relative = solution.state.relative[camera - 1]
+    return Pose(relative.rotation @ boards.rotation, relative.apply(boards.translation_m))
 
 
-def ranges_m(solution: Adjusted) -> Array:
-    """(frames,) from the first camera to the board's middle."""
+def tilts_rad(solution: Adjusted, camera: int = 0) -> Array:
+    """(frames,) angle between the board and the image plane of a camera."""
+    return np.asarray(np.arccos(np.clip(abs(boards_of(solution, camera).rotation[:, 2, 2]), 0, 1)))
+
+
+def ranges_m(solution: Adjusted, camera: int = 0) -> Array:
+    """(frames,) from a camera to the board's middle."""
     middle = solution.problem.board.points_m.mean(0)
-    return np.asarray(np.linalg.norm(solution.state.boards.apply(middle[None, :])[:, 0], axis=-1))
+    return np.asarray(np.linalg.norm(boards_of(solution, camera).apply(middle[None, :])[:, 0], axis=-1))
 
 
 def tilt_check(solution: Adjusted) -> Check:

@@ -98,6 +98,8 @@ def scaled_to(camera: Camera, photo: Photo, frame: str = "") -> tuple[Camera, tu
         if isinstance(upright, str):
             return upright
         camera, turned = upright
+        if frame == "stored":  # the file says so itself: no doubt to note
+            turned = ()
     if (camera.width_px, camera.height_px) == size:
         return camera, turned
     was = f"{camera.width_px} x {camera.height_px} px"

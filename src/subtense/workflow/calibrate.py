@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from ..adjustment_start import start_state
 from ..arrays import Array
 from ..board import Board, BoardView
 from ..calibration import Calibration, Picture, doubts
-from ..calibration_checks import checks_of, ranges_m, tilts_rad, warp_check, widened
+from ..calibration_checks import LEVEL, by_chance, checks_of, ranges_m, tilts_rad, warp_check, widened
 from ..calibration_maps import next_picture
 from ..camera import Camera
 from ..errors import FileFormatError, GeometryError, InputError, NothingFoundError
@@ -308,7 +309,18 @@ def chosen_model(
         if np.mean(more) <= max(np.std(more) / np.sqrt(more.size), NO_BETTER * means[best]):
             best = name
             break
-    return fitted[best], {name: float(np.sqrt(2 * m)) for name, m in means.items()}
+    told = {name: float(np.sqrt(2 * m)) for name, m in means.items()}
+    return (_with_k3(fitted[best]) if best == "opencv4" else fitted[best]), told
+
+
+def _with_k3(solution: Adjusted) -> Adjusted:
+    """With a third radial coefficient where noise alone would not explain what it explains, small as that may be: it costs little,
+    and without it the uncertainty would leave out what the check of the lens model then finds."""
+    with suppress(GeometryError):
+        richer = _with_model(solution, LENS_MODELS["opencv5"])
+        if not _turns_back(richer.camera()) and by_chance(solution, richer) < LEVEL:
+            return richer
+    return solution
 
 
 def _no_better(tried: Adjusted, fitted: Mapping[str, Adjusted]) -> bool:
@@ -391,7 +403,7 @@ def _pictures(
     solution: Adjusted, seen: Seen, kept: Sequence[int], left: dict[int, str], camera: int = 0
 ) -> tuple[Picture, ...]:
     frame_of = {index: frame for frame, index in enumerate(kept)}
-    rms, tilts, ranges = solution.rms_of_frames_px(camera), tilts_rad(solution), ranges_m(solution)
+    rms, tilts, ranges = solution.rms_of_frames_px(camera), tilts_rad(solution, camera), ranges_m(solution, camera)
     points = {s.frame: s.view.ids.size for s in solution.problem.sights if s.camera == camera}
     found = []
     for i, (name, view) in enumerate(zip(seen.names, seen.views, strict=True)):
@@ -428,7 +440,8 @@ def calibrate_rig(left: Sequence[Path], right: Sequence[Path], board: Board, *, 
     Args:
         left: pictures of the left camera.
         right: pictures of the right camera, in the same order.
-        board, printed, model, square_pixels, progress, threads: as in `calibrate`; one model for both cameras.
+        board, printed, model, square_pixels, progress, threads: as in `calibrate`; where no model is given each camera
+            gets its own.
 
     Raises:
         InputError: unequal numbers of pictures, or pictures of different sizes.
