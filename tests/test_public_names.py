@@ -8,6 +8,7 @@ import pytest
 import subtense
 
 NAMES = [
+    "Board",
     "Camera",
     "Document",
     "FileFormatError",
@@ -26,6 +27,8 @@ NAMES = [
     "UnknownCameraError",
     "calculate",
     "calculator_input",
+    "calibrate",
+    "calibrate_rig",
     "measure_lines",
     "measure_markers",
     "propagate",

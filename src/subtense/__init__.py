@@ -13,10 +13,11 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 if TYPE_CHECKING:
     from . import propagate as propagate
+    from .board import Board as Board
     from .camera import Camera as Camera
     from .document import Document as Document
     from .errors import FileFormatError as FileFormatError
@@ -34,17 +35,20 @@ if TYPE_CHECKING:
     from .target import Target as Target
     from .workflow.calculate import calculate as calculate
     from .workflow.calculator_input import calculator_input as calculator_input
+    from .workflow.calibrate import calibrate as calibrate
+    from .workflow.calibrate import calibrate_rig as calibrate_rig
     from .workflow.measure import measure_lines as measure_lines
     from .workflow.measure import measure_markers as measure_markers
     from .workflow.resolve_camera import resolve_camera as resolve_camera
     from .workflow.tables import METHODS as METHODS
 
 _HOME = {
-    "Camera": "camera", "Document": "document", "FileFormatError": "errors", "GeometryError": "errors",
+    "Board": "board", "Camera": "camera", "Document": "document", "FileFormatError": "errors", "GeometryError": "errors",
     "InputError": "errors", "METHODS": "workflow.tables", "Measurement": "quantity", "Method": "method",
     "MissingExtraError": "errors", "NothingFoundError": "errors", "Observation": "observation", "Photo": "photo",
     "Quantity": "quantity", "SubtenseError": "errors", "Target": "target", "UnknownCameraError": "errors",
     "calculate": "workflow.calculate", "calculator_input": "workflow.calculator_input",
+    "calibrate": "workflow.calibrate", "calibrate_rig": "workflow.calibrate",
     "measure_lines": "workflow.measure", "measure_markers": "workflow.measure",
     "propagate": "propagate", "resolve_camera": "workflow.resolve_camera",
 }  # fmt: skip
