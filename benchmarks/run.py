@@ -21,7 +21,14 @@ from comparison import Comparison, table
 HERE = Path(__file__).parent
 PAGE = HERE.parent / "docs" / "benchmarks.md"
 BEGIN, END = "<!-- benchmarks: begin -->", "<!-- benchmarks: end -->"
-ALL = {"startup": startup, "calc": calc, "monte_carlo": monte_carlo, "rows": rows, "pictures": pictures, "calibration": calibration}
+ALL = {
+    "startup": startup,
+    "calc": calc,
+    "monte_carlo": monte_carlo,
+    "rows": rows,
+    "pictures": pictures,
+    "calibration": calibration,
+}
 
 
 def main() -> None:
