@@ -9,6 +9,7 @@ from comparison import Comparison, compare, table
 from PIL import Image
 
 from subtense import Photo
+from subtense.detection import Search
 from subtense.detectors.markers import markers
 
 PHOTO = Path(__file__).parent.parent / "examples" / "desk.jpg"
@@ -26,7 +27,7 @@ def comparisons(turns: int = 9) -> list[Comparison]:
     return [
         compare(f"markers(), all families, {size}", lambda: markers(photo), peer,
                 lambda: detector.detectMarkers(gray), turns=turns),
-        compare(f"markers(), {family} only, {size}", lambda: markers(photo, family), peer,
+        compare(f"markers(), {family} only, {size}", lambda: markers(photo, Search(family=family)), peer,
                 lambda: detector.detectMarkers(gray), turns=turns),
         compare(f"Photo.load, {size}", lambda: Photo.load(PHOTO), "Pillow, open and load",
                 lambda: Image.open(PHOTO).load(), turns=turns),

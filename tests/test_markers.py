@@ -5,10 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from subtense.detectors.markers import FAMILIES, markers
+from subtense.detection import Search
+from subtense.detectors import markers as detector
+from subtense.detectors.markers import FAMILIES
 from subtense.photo import Metadata, Photo
 
 pytestmark = pytest.mark.opencv
+
+
+def markers(photo, family=None):
+    """The observations alone."""
+    return tuple(one.seen for one in detector.markers(photo, Search(family=family)))
 
 
 def encoded(light, exponent=None):

@@ -6,12 +6,12 @@ sides are fitted again (see `subpixel`). The size of a marker is that of its bla
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, Pixels
+from ..detection import Detection, Search
 from ..observation import Observation
 from ..photo import Photo
 from ..subpixel import encoded_gray, refine_quad
@@ -30,25 +30,24 @@ WORST_MISFIT = 0.25
 """Rms residual of a side over its contrast beyond which there is no edge."""
 
 
-def markers(
-    photo: Photo, family: str | None = None, progress: Callable[[float], None] = lambda share: None
-) -> tuple[Observation, ...]:
+def markers(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]:
     """Markers in a photo, left to right.
 
     Args:
         photo: the picture.
-        family: a key of FAMILIES, or None to try all.
-        progress: called with the share done, 0 to 1, of the longest search there can be.
+        search: `family`, `curve` and `progress` of it are heeded.
 
     Returns:
-        One Observation each: corners top-left, top-right, bottom-right, bottom-left of the marker as printed.
+        Squares: corners top-left, top-right, bottom-right, bottom-left of the marker as printed.
     """
     import cv2
+
+    search = search or Search()
 
     gray = cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY)
     encoded = encoded_gray(photo.pixels)
     found: list[Observation] = []
-    passes = _passes([family] if family else list(FAMILIES))
+    passes = _passes([search.family] if search.family else list(FAMILIES))
     done, most = 0, sum(len(names) for _, names in passes)
     for correction, names in passes:
         for name in names:
@@ -58,10 +57,10 @@ def markers(
                 seen = _located(encoded, name, number, corners)
                 found += [seen] if seen else []
             done += 1
-            progress(done / most)
+            search.progress(done / most)
         if found:
             break
-    return tuple(sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))
+    return tuple(Detection(one, "square") for one in sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))
 
 
 def _passes(families: list[str]) -> tuple[tuple[float, list[str]], ...]:

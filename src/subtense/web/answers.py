@@ -43,10 +43,10 @@ class Detector(_Answer):
 
     name: str
     title: str
-    method: str = Field(description="measures what it finds")
-    field: str = Field(description="of that method, takes an observation")
-    target: str = Field(description="written before a size, the target of that method")
-    asks: str
+    groups: list[str] = Field(description="of the targets, whose things it can find")
+    asks: str = Field(description="what must be said to have it measured; empty where that is nothing")
+    automatic: bool = Field(description="whether it is looked for unasked")
+    extra: str = Field(description="of the package, that it needs")
 
 
 class Report(_Answer):

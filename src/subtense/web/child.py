@@ -187,13 +187,14 @@ def _pyramid(pixels: Pixels, tile_px: int) -> list[tuple[int, int]]:
 def detect(task: dict[str, Any]) -> list[dict[str, Any]]:
     """Search the decoded picture whose pixels are in `path`, with a row of DETECTORS."""
     from ..photo import Metadata, Photo
-    from ..workflow.tables import DETECTORS
+    from ..workflow.detect import detect as detect_in
+    from ..workflow.detect import detection_json
 
     width, height = task["size"]
     pixels = np.memmap(task["path"], np.uint8, "r", shape=(height, width, 3))
     photo = Photo(pixels, Metadata(), Path(task["name"]), "")
-    seen = DETECTORS[task["detector"]].function(photo, progress=lambda share: say(progress=share))
-    return [observation.to_json() for observation in seen]
+    found = detect_in(photo, [task["detector"]], progress=lambda title, share: say(progress=share))
+    return [detection_json(one) for one in found.detections]
 
 
 TASKS = {"decode": decode, "detect": detect}

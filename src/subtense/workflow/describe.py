@@ -104,5 +104,5 @@ def field_text(inputs: type, name: str) -> str:
 
 def detectors() -> list[dict[str, Any]]:
     """Every row of DETECTORS."""
-    names = ("name", "title", "method", "field", "target", "asks")
+    names = ("name", "title", "groups", "asks", "automatic", "extra")
     return [{name: getattr(detector, name) for name in names} for detector in DETECTORS.values()]

@@ -8,17 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
-from ..detectors.markers import FAMILIES, markers
+from ..detection import Detection, Search, unknown_curve
+from ..detectors.markers import FAMILIES
 from ..distribution import normal_quantile
 from ..document import Document
 from ..edited import refusal
-from ..errors import FileFormatError, InputError, NothingFoundError, UnknownCameraError
+from ..errors import FileFormatError, InputError, NothingFoundError, SubtenseError, UnknownCameraError
 from ..method import Method
-from ..methods import known_size, pose
+from ..methods import known_size
 from ..observation import Observation
 from ..photo import Photo
 from ..quantity import Measurement, Note, Quantity
 from ..target import Target
+from ..targets import KnownTarget
+from .detect import Found, detect, item_of
 from .given import inputs_from_json, inputs_from_text, read_json
 from .in_photo import Item, measure_item
 from .resolve_camera import CAMERA_SOURCES, Resolved, resolve_camera
@@ -57,20 +60,16 @@ def measure_lines(
 
 
 def measure_markers(
-    photo: Photo,
-    size: Quantity,
-    *,
-    family: str | None = None,
-    camera: str | None = None,
-    level: float = 0.95,
-    seed: int = 0,
-) -> Document:
+    photo: Photo, size: Quantity, *, family: str | None = None, curve: Quantity | None = None, camera: str | None = None,
+    level: float = 0.95, seed: int = 0,
+) -> Document:  # fmt: skip
     """Range, depth and tilt of every marker in a photo.
 
     Args:
         photo: the picture.
         size: side of the markers' black square, m.
         family: of the markers; None to try all.
+        curve: exponent of the transfer curve; None where it is unknown.
         camera: what the user said of it; None to go by the photo.
         level: coverage of the intervals.
         seed: of the draws.
@@ -82,13 +81,72 @@ def measure_markers(
     if family is not None and family not in FAMILIES:
         raise InputError("--marker-family", family, f"known are {', '.join(FAMILIES)}")
     resolved = resolve_camera(photo, camera)
-    seen = _told_apart(markers(photo, family))
-    if not seen:
+    found = detect(photo, ["markers"], Search(family=family, curve=curve or unknown_curve()))
+    if not found.detections:
         raise NothingFoundError(f"{photo.name}: no marker found, one is needed; it must be sharp, whole, with a light border, "
                                 "and at least 15 px wide")  # fmt: skip
     target = Target.square(size, "marker")
-    items = [Item(pose.METHOD, {"points": one, "target": target}, one.label) for one in seen]
-    return joined([measure_item(item, photo, resolved, level=level, seed=seed) for item in items])
+    return measure_detections(found, photo, resolved, sizes={"markers": target}, level=level, seed=seed)
+
+
+def measure_detections(
+    found: Found, photo: Photo, camera: Resolved | UnknownCameraError, *, sizes: Mapping[str, Target | Quantity],
+    stated: Sequence[KnownTarget] = (), level: float = 0.95, seed: int = 0,
+) -> Document:  # fmt: skip
+    """Measure each thing that was found and whose size is known or taken to be known.
+
+    Args:
+        found: by `detect`.
+        photo: the picture.
+        camera: of it.
+        sizes: by shape or `markers`, for things whose size must be told.
+        stated: kinds that a person said are in the picture; the size of others is assumed, which is noted.
+        level: coverage of the intervals.
+        seed: of the draws.
+
+    Returns:
+        A document; what has no answer is a note `refused`, and what has no size a note `size_unknown`.
+    """
+    documents, notes = [], [*found.notes]
+    for one in found.detections:
+        size = sizes.get("markers" if one.shape == "square" else one.shape) if one.target is None else None
+        item = item_of(one, size)
+        if item is None:
+            notes.append(Note("size_unknown", f"{one.label}: found, and nothing tells its size", "give its size"))
+            continue
+        try:
+            document = measure_item(item, photo, camera, level=level, seed=seed)
+        except SubtenseError as error:
+            if len(found.detections) == 1:
+                raise
+            notes.append(Note("refused", f"{one.label}: {error}"))
+            continue
+        documents.append(_with_notes(document, (*_assumed(one, stated), *one.notes)))
+    if not documents:
+        told = camera.to_json() if isinstance(camera, Resolved) else None
+        return Document((), told, photo.to_json(), (*photo.notes, *notes))
+    whole = joined(documents)
+    return dataclasses.replace(whole, notes=(*whole.notes, *notes))
+
+
+def _assumed(one: Detection, stated: Sequence[KnownTarget]) -> tuple[Note, ...]:
+    """The note `assumed_size` where the kind of a thing, and so its size, was not said by a person."""
+    if one.target is None or any(one.target.name == target.name for target in stated):
+        return ()
+    text = f"its size is taken to be that of the {one.target.title} ({one.target.doubt})"
+    if one.others:
+        text += f"; it may as well be the {', the '.join(other.title for other in one.others)}"
+    return (
+        Note("assumed_size", text, f"say what it is with --target {one.target.name}, or measure it and give its size"),
+    )
+
+
+def _with_notes(document: Document, notes: Sequence[Note]) -> Document:
+    """The document with notes on its first measurement, which is the headline."""
+    if not notes or not document.measurements:
+        return document
+    head, *rest = document.measurements
+    return dataclasses.replace(document, measurements=(dataclasses.replace(head, notes=(*head.notes, *notes)), *rest))
 
 
 def measure_inputs(
@@ -146,17 +204,6 @@ def joined(documents: Sequence[Document]) -> Document:
     return dataclasses.replace(
         documents[0], measurements=sum((d.measurements for d in documents), ()), shapes=sum((d.shapes for d in documents), ()),
     )  # fmt: skip
-
-
-def _told_apart(seen: Sequence[Observation]) -> list[Observation]:
-    """Observations with labels of their own: a second marker of one number gets "(2)"."""
-    counts: dict[str, int] = {}
-    found = []
-    for one in seen:
-        counts[one.label] = counts.get(one.label, 0) + 1
-        again = counts[one.label] > 1
-        found.append(dataclasses.replace(one, label=f"{one.label} ({counts[one.label]})") if again else one)
-    return found
 
 
 def _check_inside(photo: Photo, line: Observation) -> None:

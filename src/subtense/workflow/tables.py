@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ..detection import Detection, Search
 from ..detectors import markers
 from ..method import Method
 from ..methods import calculator, known_distance, known_size, pose, same_plane
-from ..observation import Observation
+from ..photo import Photo
 from .report_of import REPORTS
 from .resolve_camera import CAMERA_SOURCES
 
@@ -21,35 +22,34 @@ METHODS: dict[str, Method] = {
 
 @dataclass(frozen=True)
 class Detector:
-    """One way to see targets in a photo by themselves.
+    """One way to see things in a photo by themselves.
 
     Attributes:
         name: the key in DETECTORS.
         title: what a button says.
-        function: Photo, and a callable that takes the share done (0 to 1), to Observations.
-        method: the key of METHODS that measures what it finds.
-        field: the field of that method's Inputs that an Observation goes into.
-        target: the shape of what it finds, as `Target.parse` takes it in front of a size.
-        asks: what a person must say to have it measured.
+        function: from Photo and Search to Detections.
+        groups: of data/targets.toml, whose things it can find; empty for what has no size of its own.
+        asks: what a person must say to have it measured; empty where that is nothing.
+        automatic: whether `subtense measure PHOTO` looks for it unasked.
+        extra: of the package, that it needs; empty for none.
     """
 
     name: str
     title: str
-    function: Callable[..., tuple[Observation, ...]]
-    method: str
-    field: str
-    target: str
-    asks: str
+    function: Callable[[Photo, Search], tuple[Detection, ...]]
+    groups: tuple[str, ...] = ()
+    asks: str = ""
+    automatic: bool = True
+    extra: str = ""
 
 
 DETECTORS: dict[str, Detector] = {
     d.name: d
     for d in (
-        Detector("markers", "ArUco and AprilTag markers", markers.markers, "pose", "points", "square",
-                 "side of the markers' black square"),
+        Detector("markers", "ArUco and AprilTag markers", markers.markers, asks="side of the markers' black square"),
     )
-}  # fmt: skip
-"""Ways to see targets in a photo by themselves, by name."""
+}
+"""Ways to see things in a photo by themselves, by name."""
 
 
 __all__ = ["CAMERA_SOURCES", "DETECTORS", "METHODS", "REPORTS"]

@@ -1,0 +1,158 @@
+"""Finding things in a photo by themselves, and what to measure of each: detections to items of a method."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..detection import Detection, Search
+from ..errors import InputError, MissingExtraError
+from ..photo import Photo
+from ..quantity import Note, Quantity
+from ..target import Target
+from ..targets import KnownTarget
+from .in_photo import Item
+from .tables import DETECTORS, METHODS, Detector
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a shape is measured.
+
+    Attributes:
+        method: of METHODS.
+        points: its field that takes the observation.
+        size: its field that takes the real size.
+        prefix: stands before the size where a person types it.
+    """
+
+    method: str
+    points: str
+    size: str
+    prefix: str = ""
+
+
+WAYS: dict[str, Way] = {
+    "square": Way("pose", "points", "target", "square "),
+    "rectangle": Way("pose", "points", "target", "rectangle "),
+    "length": Way("known_size", "ends", "size"),
+    "circle": Way("circle", "rim", "diameter"),
+    "sphere": Way("sphere", "rim", "diameter"),
+}
+"""By the shape of a detection."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search of a photo gave.
+
+    Attributes:
+        detections: of all detectors that were asked, in the order of the table.
+        notes: detectors that could not be asked, and why.
+    """
+
+    detections: tuple[Detection, ...]
+    notes: tuple[Note, ...] = ()
+
+
+def detectors_for(only: Sequence[str], targets: Sequence[KnownTarget]) -> list[Detector]:
+    """The rows to ask: those named; else those that find the targets; else all that look unasked.
+
+    Raises:
+        InputError: no such detector, or a target that none of them finds.
+    """
+    for name in only:
+        if name not in DETECTORS:
+            raise InputError("--only", name, f"known are {', '.join(DETECTORS)}")
+    asked = [DETECTORS[name] for name in only] or list(DETECTORS.values())
+    if not targets:
+        return asked if only else [row for row in asked if row.automatic]
+    for target in targets:
+        if not any(target.group in row.groups for row in asked):
+            raise InputError(
+                "--target", target.name, "nothing finds it by itself; give its ends with --line and --size"
+            )
+    return [row for row in asked if any(target.group in row.groups for target in targets)]
+
+
+def detect(
+    photo: Photo, only: Sequence[str] = (), search: Search | None = None,
+    progress: Callable[[str, float], None] = lambda title, share: None,
+) -> Found:  # fmt: skip
+    """Everything that the asked detectors see.
+
+    Args:
+        photo: the picture.
+        only: names of DETECTORS; empty for those that find `search.targets`, or all that look unasked.
+        search: what is known beside the photo.
+        progress: is told what is looked for, and the share of all work done.
+
+    Raises:
+        InputError: no such detector, or nothing finds one of the targets.
+        MissingExtraError: a detector that was named needs an extra.
+    """
+    search = search or Search()
+    rows = detectors_for(only, search.targets)
+    found: list[Detection] = []
+    notes: list[Note] = []
+    for number, row in enumerate(rows):
+        told = dataclasses.replace(search, progress=_part(progress, row.title, number, len(rows)))
+        told.progress(0.0)
+        try:
+            found += row.function(photo, told)
+        except MissingExtraError as error:
+            if only or search.targets:
+                raise
+            notes.append(Note("not_searched", f"{row.title} were not looked for: {error}"))
+    return Found(tuple(_told_apart(found)), tuple(notes))
+
+
+def _part(progress: Callable[[str, float], None], title: str, number: int, of: int) -> Callable[[float], None]:
+    return lambda share: progress(title, (number + share) / of)
+
+
+def _told_apart(found: Sequence[Detection]) -> list[Detection]:
+    """Detections with labels of their own: a second one of the same label gets "(2)"."""
+    counts: dict[str, int] = {}
+    out = []
+    for one in found:
+        count = counts[one.label] = counts.get(one.label, 0) + 1
+        seen = dataclasses.replace(one.seen, label=f"{one.label} ({count})") if count > 1 else one.seen
+        out.append(dataclasses.replace(one, seen=seen))
+    return out
+
+
+def size_text(detection: Detection) -> str | None:
+    """What a person would type of its size; None where it must be told."""
+    if detection.target is None:
+        return None
+    return WAYS[detection.shape].prefix + detection.target.text
+
+
+def item_of(detection: Detection, size: Target | Quantity | str | None = None) -> Item | None:
+    """What to measure: by the size given, or by that of its target; None where neither is there.
+
+    Args:
+        detection: what was found.
+        size: side of a square, or the length or diameter; text as a person types it.
+    """
+    way = WAYS[detection.shape]
+    text = way.prefix + size if isinstance(size, str) else size
+    told = text if size is not None else size_text(detection)
+    if told is None:
+        return None
+    inputs: dict[str, Any] = {way.points: detection.seen, way.size: told}
+    if detection.tilt is not None and detection.shape == "length":
+        inputs["tilt"] = detection.tilt
+    return Item(METHODS[way.method], inputs, detection.label)
+
+
+def detection_json(detection: Detection) -> dict[str, Any]:
+    """The detection with how it is measured: the method, its fields of points and of size, and the size's text."""
+    way = WAYS[detection.shape]
+    return {
+        **detection.to_json(), "method": way.method, "points_field": way.points, "size_field": way.size,
+        "size_prefix": way.prefix, "size_text": size_text(detection),
+    }  # fmt: skip
