@@ -8,8 +8,8 @@ PAGE := $(wildcard page/*.* page/public/* page/src/*.* page/src/*/*)
 
 .PHONY: demo serve test check coverage bench docs pictures clean
 
-# installing builds the page too, where its sources have changed
-$(BIN)/subtense: pyproject.toml constraints.txt hatch_build.py $(PAGE)
+# installing builds the page and fetches the networks too, where their sources have changed
+$(BIN)/subtense: pyproject.toml constraints.txt hatch_build.py networks/package-lock.json $(PAGE)
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
 	@touch $@
@@ -47,4 +47,4 @@ pictures: $(BIN)/pytest          ## the pictures of the page in the documentatio
 	SUBTENSE_PICTURES=docs/pictures $(BIN)/pytest tests/web/test_pages.py -k pictures
 
 clean:
-	rm -rf page/node_modules src/subtense/web/static $(VENV) site demo-out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf page/node_modules src/subtense/web/static src/subtense/networks/files $(VENV) site demo-out .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -21,6 +21,8 @@ HEAVY = {
     "matplotlib",
     "lensfunpy",
     "pycolmap",
+    "ai_edge_litert",
+    "onnxruntime",
 }
 ALLOWED = {"numpy", "click", *HEAVY}
 

@@ -102,6 +102,10 @@ class MissingExtraError(SubtenseError, ImportError):
         extra: the name to install, as in `pip install "subtense[extra]"`.
     """
 
-    def __init__(self, what: str, extra: str) -> None:
+    def __init__(self, what: str, extra: str, cure: str | None = None) -> None:
         self.extra = extra
-        super().__init__(f'{what} needs an extra that is not installed; pip install "subtense[{extra}]"')
+        super().__init__(
+            f"{what}: {cure}"
+            if cure
+            else f'{what} needs an extra that is not installed; pip install "subtense[{extra}]"'
+        )
