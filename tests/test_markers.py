@@ -91,4 +91,4 @@ def test_covariance_is_positive_and_of_the_pictures_size():
     photo, _ = picture()
     (found,) = markers(photo)
     assert np.linalg.eigvalsh(found.cov).min() > 0
-    assert 0.02 < np.sqrt(np.diag(found.cov)).max() < 0.5
+    assert 0.003 < np.sqrt(np.diag(found.cov)).max() < 0.5

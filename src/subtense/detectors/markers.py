@@ -1,101 +1,148 @@
 """ArUco and AprilTag markers: found in every family, corners located in linear light with their covariance.
 
-OpenCV finds and reads the markers; its own corners make a marker too small by 0.2 to 2.7 %, so the black square's four
-sides are fitted again (see `subpixel`). The size of a marker is that of its black square, without the white border.
+OpenCV finds the quadrilaterals, on a coarse level of the picture first; which marker one is, is read here in all families at
+once; and its corners are those of its whole pattern, fitted at full resolution (see `pattern`): OpenCV's own make a marker too
+small by 0.2 to 2.7 %. The size of a marker is that of its black square, without the white border.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
 from ..arrays import Array, Pixels
+from ..dark_quads import dark_quads
 from ..detection import Detection, Search
+from ..marker_codes import FAMILIES, WEAK, Reader, Reading, cells_of
 from ..observation import Observation
+from ..pattern import fit_pattern
 from ..photo import Photo
-from ..subpixel import encoded_gray, refine_quad
+from ..quantity import Quantity
+from ..subpixel import refine_quad
 
-FAMILIES: dict[str, tuple[str, int]] = {
-    "36h11": ("DICT_APRILTAG_36h11", 8), "25h9": ("DICT_APRILTAG_25h9", 7), "36h10": ("DICT_APRILTAG_36h10", 8),
-    "16h5": ("DICT_APRILTAG_16h5", 6), "aruco_mip_36h12": ("DICT_ARUCO_MIP_36h12", 8),
-    "aruco_original": ("DICT_ARUCO_ORIGINAL", 7), "7x7": ("DICT_7X7_1000", 9), "6x6": ("DICT_6X6_1000", 8),
-    "5x5": ("DICT_5X5_1000", 7), "4x4": ("DICT_4X4_1000", 6),
-}  # fmt: skip
-"""Family: OpenCV's name, and modules across its black square. Earlier families win where a marker reads in two."""
+__all__ = ["FAMILIES", "markers"]
 
-WEAK = ("16h5", "4x4")
-"""Families of 16 bits."""
 WORST_MISFIT = 0.25
-"""Rms residual of a side over its contrast beyond which there is no edge."""
+"""Rms residual over contrast beyond which there is no marker."""
+WORST_PATTERN = 0.12
+"""The same of a whole pattern, beyond which only its sides are believed."""
+COARSE_PX = 1100
+"""Longer side of the level that is searched first."""
+SMALLEST_QUAD_PX = 8.0
+MOST_ENLARGED = 2_000_000
+"""Pixels of a picture that is searched twice as large as well, where nothing was found."""
 
 
 def markers(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]:
     """Markers in a photo, left to right.
 
+    A coarse level is searched first, the full picture where nothing was found there or `search.thorough` says so.
+
     Args:
         photo: the picture.
-        search: `family`, `curve` and `progress` of it are heeded.
+        search: `family`, `curve`, `thorough` and `progress` of it are heeded.
 
     Returns:
         Squares: corners top-left, top-right, bottom-right, bottom-left of the marker as printed.
     """
-    import cv2
-
     search = search or Search()
-
-    gray = cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY)
-    encoded = encoded_gray(photo.pixels)
+    gray = _gray(photo.pixels)
     found: list[Observation] = []
-    passes = _passes([search.family] if search.family else list(FAMILIES))
-    done, most = 0, sum(len(names) for _, names in passes)
-    for correction, names in passes:
-        for name in names:
-            for number, corners in _detected(cv2, gray, name, correction):
-                if any(_same_place(corners, other.points_px) for other in found):
-                    continue
-                seen = _located(encoded, name, number, corners)
-                found += [seen] if seen else []
-            done += 1
-            search.progress(done / most)
-        if found:
+    levels = _levels(gray.shape[1], gray.shape[0], thorough=search.thorough)
+    for done, scale in enumerate(levels):
+        search.progress(done / len(levels))
+        if scale <= 1 or not found:
+            found += [one for one in _on_level(gray, scale, search) if not _seen(one, found)]
+        if found and not search.thorough:
             break
+    search.progress(1.0)
     return tuple(Detection(one, "square") for one in sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))
 
 
-def _passes(families: list[str]) -> tuple[tuple[float, list[str]], ...]:
-    """(share of bits corrected, families): exact readings first; the next only where the one before found nothing.
+def _gray(pixels: Pixels) -> Pixels:
+    """(H, W) encoded luma."""
+    import cv2
 
-    Every 16th dark square reads as some marker of 16 bits, so such families are believed only in want of a stronger one.
-    """
+    if pixels.strides[2] == 0:  # one channel, seen three times
+        return pixels[..., 0]
+    return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY))
+
+
+def _levels(width_px: int, height_px: int, *, thorough: bool) -> list[float]:
+    """Scales that are searched, in order."""
+    coarse = min(1.0, COARSE_PX / max(width_px, height_px))
+    scales = [coarse] if coarse > 0.7 else [coarse, 1.0]
+    return [*scales, 2.0] if thorough or width_px * height_px <= MOST_ENLARGED else scales
+
+
+def _on_level(gray: Pixels, scale: float, search: Search) -> list[Observation]:
+    """Markers among the quadrilaterals of one level, located in the full picture."""
+    import cv2
+
+    if scale == 1:
+        level = gray
+    else:
+        how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
+        level = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=how)
+    readers = [(quad, Reader(level, quad)) for quad in dark_quads(level, SMALLEST_QUAD_PX)]
+    for correct, families in _passes([search.family] if search.family else list(FAMILIES)):
+        found: list[Observation] = []
+        for quad, reader in readers:
+            read = next((r for r in (reader.read(name, correct) for name in families) if r), None)
+            one = read and _located(gray, _turned(_full(quad, scale), read), read, search.curve)
+            if one and not _seen(one, found):
+                found.append(one)
+        if found:
+            return found
+    return []
+
+
+def _passes(families: list[str]) -> Iterator[tuple[float, list[str]]]:
+    """(share of bits corrected, families): exact readings first; the next only where the one before found nothing."""
     strong = [name for name in families if name not in WEAK]
-    return (0.0, strong), (0.0, families), (0.5, strong), (0.5, families)
+    yield from ((0.0, strong), (0.5, strong), (0.0, families), (0.5, families))
 
 
-def _located(encoded: Array, name: str, number: int, corners: Array) -> Observation | None:
-    """A marker with its corners from its edges; None where it has none to see."""
-    module = float(np.sqrt(_area(corners))) / FAMILIES[name][1]
-    quad = refine_quad(encoded, corners, module)
+def _full(quad: Array, scale: float) -> Array:
+    """Places on a level as places in the full picture."""
+    return (quad + 0.5) / scale - 0.5
+
+
+def _turned(quad: Array, read: Reading) -> Array:
+    """Corners in the marker's own order."""
+    return np.roll(quad, read.turns, axis=0)
+
+
+def _located(gray: Pixels, corners: Array, read: Reading, curve: Quantity) -> Observation | None:
+    """A marker with its corners from its pattern, or from its sides where something lies over it; None without any."""
+    patch, offset = _patch(gray, corners)
+    label, rough = f"{read.family} id {read.number}", corners - offset
+    cells = cells_of(read.family, read.number)
+    pattern = fit_pattern(patch, rough, cells, curve)
+    if pattern is not None and pattern.misfit < WORST_PATTERN:
+        return Observation(pattern.corners_px + offset, cov=pattern.cov, label=label, source="pattern of the marker")
+    quad = refine_quad(patch, rough, float(np.sqrt(_area(rough))) / len(cells))
     if quad is None or quad.misfit >= WORST_MISFIT:
         return None
-    return Observation(quad.corners_px, cov=quad.cov, label=f"{name} id {number}", source="edges of the marker")
+    return Observation(quad.corners_px + offset, cov=quad.cov, label=label, source="edges of the marker")
 
 
-def _detected(cv2: Any, gray: Pixels, name: str, correction: float) -> list[tuple[int, Array]]:
-    parameters = cv2.aruco.DetectorParameters()
-    parameters.errorCorrectionRate = correction
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    parameters.minMarkerPerimeterRate = 0.01
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, FAMILIES[name][0]))
-    quads, numbers, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(gray)
-    if numbers is None:
-        return []
-    return [(int(n), np.reshape(q, (4, 2)).astype(float)) for n, q in zip(np.reshape(numbers, -1), quads, strict=True)]
+def _patch(gray: Pixels, corners: Array) -> tuple[Array, Array]:
+    """The part of the picture around a marker, 0 to 1, and where its first pixel lies."""
+    margin = 0.4 * np.ptp(corners, axis=0).max() + 4
+    low = np.maximum(np.floor(corners.min(axis=0) - margin).astype(int), 0)
+    high = np.ceil(corners.max(axis=0) + margin).astype(int) + 1
+    return gray[low[1] : high[1], low[0] : high[0]] / 255.0, low.astype(float)
 
 
 def _area(corners: Array) -> float:
     x, y = corners[:, 0], corners[:, 1]
     return float(abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2)
+
+
+def _seen(one: Observation, others: list[Observation]) -> bool:
+    return any(_same_place(one.points_px, other.points_px) for other in others)
 
 
 def _same_place(a: Array, b: Array) -> bool:
