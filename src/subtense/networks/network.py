@@ -18,6 +18,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import FileFormatError, MissingExtraError
+from .parts import part_of
 
 MOST_BYTES = 512 * 2**20
 """Of a file; the largest detectors have a quarter of that."""
@@ -68,15 +69,16 @@ class Network:
     Attributes:
         path: the file.
         kind: "tflite" or "onnx", by the file's content.
+        between: names of tensors given and of tensors wanted, where only that part of a TFLite network is run.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, between: tuple[tuple[str, ...], tuple[str, ...]] | None = None) -> None:
         """Look at the file; it is opened by an engine when something is asked of it.
 
         Raises:
             FileFormatError: no such file, too large, or neither TFLite nor ONNX.
         """
-        self.path = Path(path)
+        self.path, self.between = Path(path), between
         self.kind = _kind(self.path)
         self._kept = threading.local()
 
@@ -134,7 +136,7 @@ class Network:
         if kept is not None:
             return kept
         with _complaints_of(self.path):
-            engine: _Engine = _TFLite(self.path) if self.kind == "tflite" else _Onnx(self.path)
+            engine: _Engine = _TFLite(self.path, self.between) if self.kind == "tflite" else _Onnx(self.path)
         for tensor in (*engine.inputs, *engine.outputs):
             if np.prod([n or 1 for n in tensor.shape], dtype=float) > MOST_VALUES:
                 raise FileFormatError(self.path, f"has {tensor}, which is more than {MOST_VALUES} values")
@@ -173,13 +175,14 @@ def _complaints_of(path: Path) -> Iterator[None]:
 class _TFLite:
     """LiteRT's interpreter."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, between: tuple[tuple[str, ...], tuple[str, ...]] | None) -> None:
         try:
             from ai_edge_litert.interpreter import Interpreter
         except ImportError:
             raise MissingExtraError("running TFLite networks", "networks") from None
         with _unsaid():
-            self._interpreter = Interpreter(model_path=str(path), num_threads=THREADS)
+            given_by = {"model_content": part_of(path.read_bytes(), *between)} if between else {"model_path": str(path)}
+            self._interpreter = Interpreter(**given_by, num_threads=THREADS)
             self._interpreter.allocate_tensors()
         given, got = self._interpreter.get_input_details(), self._interpreter.get_output_details()
         self._in, self._out = [one["index"] for one in given], [one["index"] for one in got]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..detection import Detection, Search
-from ..detectors import markers, objects, qr_codes
+from ..detectors import faces, markers, objects, qr_codes
 from ..method import Method
 from ..methods import calculator, known_distance, known_size, pose, same_plane
 from ..photo import Photo
@@ -48,6 +48,7 @@ DETECTORS: dict[str, Detector] = {
     for d in (
         Detector("markers", "ArUco and AprilTag markers", markers.markers, asks="side of the markers' black square"),
         Detector("qr_codes", "QR codes", qr_codes.qr_codes, asks="side of the code"),
+        Detector("faces", "faces, by their eyes", faces.faces, ("body",), extra="networks"),
         Detector("objects", "people, vehicles and household things", objects.objects,
                  ("body", "vehicle", "bottle", "household"), extra="networks"),
     )
