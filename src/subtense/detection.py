@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from .camera import Camera
 from .errors import InputError
 from .observation import Observation
 from .quantity import Note, Quantity
@@ -49,6 +50,7 @@ class Search:
         curve: exponent of the transfer curve, from light to encoded values.
         thorough: whether the full resolution is searched even where a coarse one would do.
         model: a network of one's own, for detectors that take one.
+        camera: of the picture, where it is known: it tells shapes apart that perspective makes alike.
         progress: is told the share done, 0 to 1.
     """
 
@@ -57,6 +59,7 @@ class Search:
     curve: Quantity = field(default_factory=unknown_curve)
     thorough: bool = False
     model: Path | None = None
+    camera: Camera | None = None
     progress: Callable[[float], None] = lambda share: None
 
 

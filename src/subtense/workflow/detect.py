@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..detection import Detection, Search
-from ..errors import InputError, MissingExtraError
+from ..errors import InputError, MissingExtraError, UnknownCameraError
 from ..photo import Photo
 from ..quantity import Note, Quantity
 from ..target import Target
 from ..targets import KnownTarget
 from .in_photo import Item
+from .resolve_camera import resolve_camera
 from .tables import DETECTORS, METHODS, Detector
 
 
@@ -93,7 +94,7 @@ def detect(
         InputError: no such detector, or nothing finds one of the targets.
         MissingExtraError: a detector that was named needs an extra.
     """
-    search = search or Search()
+    search = _with_camera(photo, search or Search())
     rows = detectors_for(only, search.targets)
     found: list[Detection] = []
     notes: list[Note] = []
@@ -107,6 +108,16 @@ def detect(
                 raise
             notes.append(Note("not_searched", f"{row.title} were not looked for: {error}"))
     return Found(tuple(_told_apart(found)), tuple(notes))
+
+
+def _with_camera(photo: Photo, search: Search) -> Search:
+    """The search with the photo's own camera where none was told; a photo that tells none is searched without."""
+    if search.camera is not None:
+        return search
+    try:
+        return dataclasses.replace(search, camera=resolve_camera(photo).camera)
+    except UnknownCameraError:
+        return search
 
 
 def _part(progress: Callable[[str, float], None], title: str, number: int, of: int) -> Callable[[float], None]:
