@@ -16,20 +16,18 @@ import numpy as np
 
 from ..arrays import Array
 from ..detection import Detection, Search
-from ..networks.body import Body, body_in
+from ..networks.body import AROUND, Body, body_in
 from ..networks.kinds import KINDS, PERSON, RIDDEN, Kind, kind_of
 from ..networks.own_detector import own_detector
-from ..networks.stance import LEAST_SCORE, cut_by_border, hidden, posture
+from ..networks.stance import LEAST_SCORE, cut_by_border, disagreement, doubtful, hidden, posture
 from ..networks.things import PACKAGED, Eye, Thing, one_label, refined, things
 from ..observation import Observation
 from ..photo import Photo
 from ..quantity import Note
 from ..targets import KnownTarget
 
-HEAD_BIAS, SOLE_BIAS = 0.003, -0.010
-"""Where a person's pixels end: below the top of the head, below the sole; shares of the height (benchmarks/boxes.py)."""
-HEAD_SIGMA, SOLE_SIGMA = 0.010, 0.015
-"""What is left of it, one standard deviation, shares of the height (benchmarks/boxes.py)."""
+HEAD_SIGMA, SOLE_SIGMA = 0.012, 0.015
+"""Of the ends of a person's pixels, shares of the height: 0.006 and 0.007 of most, more of a few (benchmarks/boxes.py)."""
 EDGE_SIGMA = 0.05
 """Of the upper and lower edge of a box, share of its height (benchmarks/boxes.py)."""
 PIXEL_SIGMA = 0.5
@@ -106,17 +104,24 @@ def _person(
         note = _cut("reaches to the border of the picture")
     elif why := posture(body) or _rides(thing, ridden):
         note = _not_standing(why)
-    elif why := hidden(body):
+    elif why := hidden(body) or doubtful(body, again := body_in(photo.pixels, thing.box_px, AROUND[1])):
         note = _cut(why)
     else:
-        height, middle = body.height_px, (body.left_px + body.right_px) / 2
-        floor = PIXEL_SIGMA * max(body.pixel, 1.0)
-        ends = np.array([[middle, body.top_px - HEAD_BIAS * height], [middle, body.bottom_px - SOLE_BIAS * height]])
-        sigma = np.hypot(np.array([HEAD_SIGMA, SOLE_SIGMA]) * height, floor)
-        observation = Observation(_inside(ends, photo), sigma, label=PERSON.name, score=thing.score, source="objects")
-        return Detection(observation, "length", taken[0], taken[1:])
+        assert again is not None
+        return _standing(photo, thing, body, again, taken)
     box = np.array([body.left_px, body.top_px, body.right_px, body.bottom_px])
     return _unsized(photo, PERSON, Thing(thing.label, thing.score, box), note)
+
+
+def _standing(photo: Photo, thing: Thing, body: Body, again: Body, taken: tuple[KnownTarget, ...]) -> Detection:
+    """Head and sole: the means of two looks; what they differ by is in their sigma."""
+    middle, height = (body.left_px + body.right_px) / 2, body.height_px
+    ends = np.array([[middle, (body.top_px + again.top_px) / 2], [middle, (body.bottom_px + again.bottom_px) / 2]])
+    floor = PIXEL_SIGMA * max(body.pixel, 1.0)
+    apart = np.array(disagreement(body, again))
+    sigma = np.sqrt((np.array([HEAD_SIGMA, SOLE_SIGMA]) * height) ** 2 + floor**2 + (apart / 2) ** 2)
+    observation = Observation(_inside(ends, photo), sigma, label=PERSON.name, score=thing.score, source="objects")
+    return Detection(observation, "length", taken[0], taken[1:])
 
 
 def _same(body: Body, other: Body) -> bool:

@@ -16,8 +16,8 @@ from .view import View, cut
 
 FILE = "pose_landmark_lite.tflite"
 SIZE_PX = 256
-AROUND = 1.5
-"""Side of the view in longer sides of the person's box: with a margin for what the box has left out."""
+AROUND = (1.5, 1.25)
+"""Sides of two views in longer sides of the person's box, with a margin for what the box has left out."""
 
 EYES, SHOULDERS, HIPS, KNEES, ANKLES = (2, 5), (11, 12), (23, 24), (25, 26), (27, 28)
 FEET = ((27, 29, 31), (28, 30, 32))
@@ -60,17 +60,18 @@ class Body:
         return np.asarray(self.joints_px[list(joints)].mean(axis=0))
 
 
-def body_in(pixels: Pixels, box_px: Array) -> Body | None:
+def body_in(pixels: Pixels, box_px: Array, around: float = AROUND[0]) -> Body | None:
     """The person in a box, or None where the network marks no pixels as one's.
 
     Args:
         pixels: (H, W, 3) of the picture.
         box_px: (4,) left, top, right, bottom, px.
+        around: side of the view, longer sides of the box.
 
     Raises:
         MissingExtraError: the installation was made without networks, or without what runs them.
     """
-    side = AROUND * float(max(box_px[2] - box_px[0], box_px[3] - box_px[1]))
+    side = around * float(max(box_px[2] - box_px[0], box_px[3] - box_px[1]))
     view = cut(pixels, (box_px[:2] + box_px[2:]) / 2, side / SIZE_PX, SIZE_PX, SIZE_PX)
     joints, score, mask, _, metres = packaged(FILE).run(view.input())
     edges = _edges(mask[0, :, :, 0], view)

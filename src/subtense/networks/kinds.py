@@ -59,7 +59,7 @@ KINDS = (
     Kind("van", ("van",), "van"),
     Kind("vehicle", ("vehicle",), stated=("van", "truck", "bus", "motorcycle")),
     Kind("motorcycle", ("motorcycle", "motorbike"), "motorcycle"),
-    Kind("bicycle", ("bicycle",), "bicycle", aspect=(0.3, 2.2)),
+    Kind("bicycle", ("bicycle",), "bicycle", ("bicycle-child",), ("bicycle-child",), aspect=(0.3, 2.2)),
     Kind("bottle", ("bottle",), "bottle", aspect=(0.15, 0.75)),
     Kind("cup", ("mug", "coffee cup", "cup"), "cup", aspect=(0.5, 2.2)),
     Kind("chair", ("chair",), "chair", aspect=(0.4, 1.6)),

@@ -112,6 +112,7 @@ def measure_detections(
         size = sizes.get("markers" if one.shape == "square" else one.shape) if one.target is None else None
         item = item_of(one, size)
         if item is None:
+            notes += [dataclasses.replace(note, text=f"{one.label}: {note.text}") for note in one.notes]
             notes.append(Note("size_unknown", f"{one.label}: found, and nothing tells its size", "give its size"))
             continue
         try:
@@ -121,7 +122,7 @@ def measure_detections(
                 raise
             notes.append(Note("refused", f"{one.label}: {error}"))
             continue
-        documents.append(_with_notes(document, (*_assumed(one, stated), *one.notes)))
+        documents.append(_with_notes(document, (*assumed(one, stated), *one.notes)))
     if not documents:
         told = camera.to_json() if isinstance(camera, Resolved) else None
         return Document((), told, photo.to_json(), (*photo.notes, *notes))
@@ -129,7 +130,7 @@ def measure_detections(
     return dataclasses.replace(whole, notes=(*whole.notes, *notes))
 
 
-def _assumed(one: Detection, stated: Sequence[KnownTarget]) -> tuple[Note, ...]:
+def assumed(one: Detection, stated: Sequence[KnownTarget]) -> tuple[Note, ...]:
     """The note `assumed_size` where the kind of a thing, and so its size, was not said by a person."""
     if one.target is None or any(one.target.name == target.name for target in stated):
         return ()
