@@ -78,9 +78,59 @@ def _clipped(box, pixels):
     return float(left), float(top), float(left + side), float(top + side)
 
 
+def told(ratios, size_px):
+    return f"{np.mean(ratios) - 1:+.2%} sd {np.std(ratios):.2%} = {np.std(ratios) * size_px:.2f} px"
+
+
+def by_size(large, eyes_px, rng):
+    """How both lengths and the turn of the large faces change where they are small and worse."""
+    eyes, iris, turned, lost = [], [], [], 0
+    for _, pixels, face in large:
+        apart, irises = lengths(face)
+        for _ in range(ROUNDS if eyes_px < 0.92 * apart else 0):
+            small, scale, mirrored = worsened(pixels, face, eyes_px, rng)
+            found = find_faces(small, thorough=True)
+            if not found:
+                lost += 1
+                continue
+            best = max(found, key=lambda one: lengths(one)[0])
+            got, got_irises = lengths(best)
+            eyes.append(got / (apart * scale[0]))
+            pair = irises[::-1] if mirrored else irises
+            iris += [a / (b * scale[0]) for a, b in zip(got_irises, pair, strict=True)]
+            turned.append(math.degrees(best.eyes_turned_rad * (-1 if mirrored else 1) - face.eyes_turned_rad))
+    wide = eyes_px * EXPECTED * 1.07
+    print(f"eyes {eyes_px:3d} px apart: n {len(eyes):3d}, lost {lost}, eyes {told(eyes, eyes_px)}")
+    print(f"    iris {wide:.1f} px: {told(iris, wide)}; turn {np.mean(turned):+.1f}° sd {np.std(turned):.1f}°")
+
+
+def by_mirror(large):
+    """What the mirrored pictures say of the turn and of the eyes' distance."""
+    turns, eyes = [], []
+    for _, pixels, face in large:
+        x = pixels.shape[1] - 1 - face.mesh_px[:, 0].mean()
+        found = find_faces(np.ascontiguousarray(pixels[:, ::-1]))
+        for same in sorted(found, key=lambda one: abs(one.mesh_px[:, 0].mean() - x))[:1]:
+            turns.append(math.degrees(face.eyes_turned_rad + same.eyes_turned_rad) / 2)
+            eyes.append(lengths(same)[0] / lengths(face)[0])
+    print(
+        f"turn and its mirror: mean {np.mean(turns):+.2f}°, sd {np.std(turns):.2f}°; eyes' distance sd {np.std(eyes):.2%}"
+    )
+
+
+def among_persons(persons):
+    """The iris's width over the pupils' distance against what it is among adults."""
+    ratios = np.array([np.mean(values) for values in persons.values()]) / EXPECTED
+    each = math.sqrt(len(ratios))
+    print(
+        f"iris over eyes against {EXPECTED:.4f}: {ratios.mean():.3f}, sd among {len(ratios)} persons {ratios.std(ddof=1):.3f}"
+    )
+    print(f"    u of the mean by that {ratios.std(ddof=1) / each:.3f}, by the spread of people {0.07 / each:.3f}")
+
+
 def main():
     rng = np.random.default_rng(5)
-    large, agree, persons, turns = [], [], {}, []
+    large, agree, persons = [], [], {}
     for name, pixels in pictures(Path(sys.argv[1])):
         for number, face in enumerate(find_faces(pixels)):
             apart, irises = lengths(face)
@@ -88,59 +138,23 @@ def main():
                 continue
             if min(irises) > 7:
                 agree.append(math.log(irises[0] / irises[1]))
-                key = name.split("_")[0] if not name.startswith("sample") else f"{name} {number}"
+                person = f"{name} {number}" if name.startswith("sample") else name.split("_")[0]
                 upright = np.mean(irises) / apart * math.cos(face.eyes_turned_rad)
-                persons.setdefault(key, []).append(upright)
+                persons.setdefault(person, []).append(upright)
             if apart > 44:
                 large.append((name, pixels, face))
     print(f"{len(large)} large faces, {len(persons)} persons")
     for eyes_px in SIZES_PX:
-        eyes, iris, turned, lost = [], [], [], 0
-        for _, pixels, face in large:
-            apart, irises = lengths(face)
-            if eyes_px > 0.92 * apart:
-                continue
-            for _ in range(ROUNDS):
-                small, scale, mirrored = worsened(pixels, face, eyes_px, rng)
-                found = find_faces(small, thorough=True)
-                if not found:
-                    lost += 1
-                    continue
-                best = max(found, key=lambda one: lengths(one)[0])
-                got, got_irises = lengths(best)
-                eyes.append(got / (apart * scale[0]))
-                pair = irises[::-1] if mirrored else irises
-                iris += [a / (b * scale[0]) for a, b in zip(got_irises, pair, strict=True)]
-                turned.append(math.degrees(best.eyes_turned_rad * (-1 if mirrored else 1) - face.eyes_turned_rad))
-        print(f"eyes {eyes_px:3d} px apart: n {len(eyes):3d}, lost {lost}, eyes {np.mean(eyes) - 1:+.2%} sd {np.std(eyes):.2%} "
-              f"= {np.std(eyes) * eyes_px:.2f} px; iris ({eyes_px * EXPECTED * 1.08:.1f} px) {np.mean(iris) - 1:+.2%} "
-              f"sd {np.std(iris):.2%} = {np.std(iris) * eyes_px * EXPECTED * 1.08:.2f} px; turn {np.mean(turned):+.1f}° sd {np.std(turned):.1f}°")  # fmt: skip
-    print(
-        f"left against right iris: n {len(agree)}, mean {np.mean(agree):+.2%}, one iris {np.std(agree) / math.sqrt(2):.2%}"
-    )
-    ratios = np.array([np.mean(values) for values in persons.values()]) / EXPECTED
-    print(f"iris over eyes against {EXPECTED:.4f}: {ratios.mean():.3f}, sd among {len(ratios)} persons {ratios.std(ddof=1):.3f}, "
-          f"of the mean by that {ratios.std(ddof=1) / math.sqrt(len(ratios)):.3f}, by people's spread {0.07 / math.sqrt(len(ratios)):.3f}")  # fmt: skip
-    for _, pixels, face in large:
-        mirror = np.ascontiguousarray(pixels[:, ::-1])
-        x = pixels.shape[1] - 1 - face.mesh_px[:, 0].mean()
-        same = min(find_faces(mirror), key=lambda one: abs(one.mesh_px[:, 0].mean() - x), default=None)
-        if same is not None:
-            turns.append((math.degrees(face.eyes_turned_rad + same.eyes_turned_rad),
-                          lengths(same)[0] / lengths(face)[0] - 1))  # fmt: skip
-    turns = np.array(turns)
-    print(
-        f"turn and its mirror: mean {turns[:, 0].mean() / 2:+.2f}°, sd {turns[:, 0].std() / 2:.2f}°; eyes' distance sd {turns[:, 1].std():.2%}"
-    )
-    false = sum(
-        len(find_faces(rng.integers(0, 256, (h, w, 3), dtype=np.uint8)))
-        for h, w in [(480, 640), (1500, 2000), (64, 64)]
-    )
-    print(f"noise: {false} faces")
-    if len(sys.argv) > 2:
-        for name, pixels in pictures(Path(sys.argv[2])):
-            for face in find_faces(pixels):
-                print("   ", name, np.round(face.box_px), round(face.score, 2), f"eyes {lengths(face)[0]:.0f} px")
+        by_size(large, eyes_px, rng)
+    one = np.std(agree) / math.sqrt(2)
+    print(f"left against right iris: n {len(agree)}, mean {np.mean(agree):+.2%}, one iris {one:.2%}")
+    among_persons(persons)
+    by_mirror(large)
+    noise = [rng.integers(0, 256, (h, w, 3), dtype=np.uint8) for h, w in [(480, 640), (1500, 2000), (64, 64)]]
+    print(f"noise: {sum(len(find_faces(pixels)) for pixels in noise)} faces")
+    for name, pixels in pictures(Path(sys.argv[2])) if len(sys.argv) > 2 else ():
+        for face in find_faces(pixels):
+            print("   ", name, np.round(face.box_px), round(face.score, 2), f"eyes {lengths(face)[0]:.0f} px")
 
 
 if __name__ == "__main__":

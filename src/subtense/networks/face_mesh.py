@@ -27,9 +27,10 @@ DETECTOR = "face_detection_full_range_sparse.tflite"
 MESH = "face_landmark_with_attention.tflite"
 INPUT_PX = 192
 """Width and height of what both look at."""
-SURE = 0.6
-"""Score from which the detector is believed; where it errs, the mesh says so."""
-SURE_MESH = 0.9
+LIKELY, SURE = 0.5, 0.7
+"""Scores from which a box counts, and from which one of a face's boxes must be, to be believed (markers get up to 0.63)."""
+HOPEFUL_MESH, SURE_MESH = 0.02, 0.9
+"""The same of the mesh: at first, where the box may lie askew, and at last."""
 SMALLEST_TILE_PX = 640
 SMALLEST_TILE_THOROUGH_PX = 320
 _SAME = 0.3
@@ -109,7 +110,7 @@ class Face:
 
 
 def find_faces(
-    pixels: Pixels, *, thorough: bool = False, progress: Callable[[float], None] = lambda share: None
+    pixels: Pixels, *, thorough: bool = False, progress: Callable[[float], None] | None = None
 ) -> tuple[Face, ...]:
     """All faces, from left to right.
 
@@ -125,13 +126,14 @@ def find_faces(
     seen = []
     for number, (centre, side) in enumerate(tiles):
         seen.append(_detected(pixels, centre, side / INPUT_PX))
-        progress(0.9 * (number + 1) / len(tiles))
+        if progress is not None:
+            progress((number + 1) / len(tiles))
     values, scores = np.concatenate([v for v, _ in seen]), np.concatenate([s for _, s in seen])
     if not len(scores):
         return ()
     found: list[Face] = []
     for value, score in zip(*blended(values[:, :4], scores, _SAME, values), strict=True):
-        face = _meshed(pixels, value, float(score))
+        face = _meshed(pixels, value, float(score)) if score >= SURE else None
         if face is not None and not any(_same(face, other) for other in found):
             found.append(face)
     return tuple(sorted(found, key=lambda face: float(face.box_px[0])))
@@ -167,7 +169,7 @@ def _detected(pixels: Pixels, centre_px: Array, scale: float) -> tuple[Array, Ar
     seen = cut(pixels, centre_px, scale, INPUT_PX, INPUT_PX)
     values, scores = _detector().run(seen.input(-1.0, 1.0))
     sure = sigmoid(scores[0, :, 0])
-    kept = sure >= SURE
+    kept = sure >= LIKELY
     coded, anchors = values[0][kept], INPUT_PX * grid_anchors(INPUT_PX, [(4, 1)])[kept]
     middle, half = coded[:, None, :2] + anchors[:, None], coded[:, None, 2:4] / 2
     points = np.concatenate([middle - half, middle + half, coded[:, 4:].reshape(-1, 6, 2) + anchors[:, None]], axis=1)
@@ -183,13 +185,16 @@ def _meshed(pixels: Pixels, value: Array, score: float) -> Face | None:
         seen = cut(pixels, centre, max(side, 8.0) / INPUT_PX, INPUT_PX, INPUT_PX, angle_rad=angle)
         flat, features, flag = _mesh().run(seen.input())
         local = flat.reshape(468, 3)
-        if not sigmoid(flag.reshape(-1)[0]) >= SURE_MESH:
+        sure = float(sigmoid(flag.reshape(-1)[0]))
+        if not sure >= HOPEFUL_MESH:
             return None
         points = seen.in_picture(local[:, :2] - 0.5)
         angle = math.atan2(*(points[_OUTER[1]] - points[_OUTER[0]])[::-1])
         turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
         low, high = (points @ turn).min(axis=0), (points @ turn).max(axis=0)
         centre, side = turn @ ((low + high) / 2), 1.5 * float(max(high - low))
+    if sure < SURE_MESH:
+        return None
     eyes = (_eye(seen, local, features[0], 0), _eye(seen, local, features[0], 1))
     return Face(box, score, np.concatenate([points, local[:, 2:] * seen.scale], axis=1), eyes)
 
