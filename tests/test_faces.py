@@ -53,7 +53,7 @@ def depth(detection):
 def test_the_distance_of_a_face_holds_its_stereo_depth(selfies, stereo_depth_m):
     assert stereo_depth_m == pytest.approx(0.591, abs=0.01)
     for photo in selfies:
-        found = faces(photo)
+        found = faces(photo, Search(camera=CAMERA))
         assert [one.label for one in found] == ["face 1 eyes", "face 1 iris"]
         assert [one.target.name for one in found] == ["eye-distance", "iris"]
         for one in found:
@@ -178,7 +178,18 @@ def test_progress_reaches_the_end(selfies):
 
 
 def test_the_tilt_is_that_to_the_picture_and_not_to_the_line_of_sight(selfies):
-    """The pair is rectified: moved by the base, the face is seen under another line of sight, and lies the same to both."""
-    left, right = (faces(photo)[0].tilt for photo in selfies)
-    assert isinstance(left, Quantity)
+    """The pair is rectified: moved by the base, the face is seen under another line of sight, and lies the same to both. How
+    it lies is told by the disparities of the outer corners of the eyes, which stand some 95 mm apart."""
+    with_camera = Search(camera=CAMERA)
+    left, right = (faces(photo, with_camera)[0].tilt for photo in selfies)
     assert float(left.value) == pytest.approx(float(right.value), abs=math.radians(3))
+    corners = [find_faces(photo.pixels)[0].mesh_px[[33, 263], :2] for photo in selfies]
+    depth_m = F_PX * BASE_M / (corners[0] - corners[1])[:, 0]
+    across_m = float(np.diff(corners[0][:, 0])[0]) * depth_m.mean() / F_PX
+    assert float(left.value) == pytest.approx(math.atan2(depth_m[1] - depth_m[0], across_m), abs=math.radians(5))
+
+
+def test_without_a_camera_the_tilt_is_less_certain(selfies):
+    known, unknown = faces(selfies[0], Search(camera=CAMERA))[0].tilt, faces(selfies[0])[0].tilt
+    assert unknown.u > known.u
+    assert abs(float(unknown.value) - float(known.value)) < 2 * math.sqrt(unknown.u**2 - known.u**2)

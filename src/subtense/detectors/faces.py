@@ -3,7 +3,7 @@
 The pupils are the centres of the irises. Their distance shrinks with the cosine of the angle by which the head is turned, which
 the mesh of the face tells; the iris's width with that of the gaze, which is the head's turn and where the iris stands between
 the corners of the eye (the eye turns about a point 10.5 mm behind it). Both angles are to the line of sight; how the line of
-sight lies to the picture's axis is added from the place in the picture, by the tagged focal length or a usual one.
+sight lies to the picture's axis is added from the place in the picture, by the camera or else by a usual focal length.
 
 The limbus, the iris's border, is soft over some 0.5 mm, and a fit of its edges finds it at another place than clinicians'
 callipers, by more than the network's points are off; so the network's width is taken, put right by what it is too wide on
@@ -19,6 +19,7 @@ import math
 import numpy as np
 
 from ..arrays import Array
+from ..camera import Camera
 from ..detection import Detection, Search
 from ..networks.face_mesh import Eye, Face, find_faces
 from ..observation import Observation
@@ -40,6 +41,8 @@ TURN_SIGMA = 0.2
 GAZE_SIGMA_RAD = math.radians(8.0)
 EYE_RADIUS_M = 0.0105
 """From the point about which an eye turns to its iris."""
+USUAL_FOCAL, USUAL_FOCAL_U = 0.9, 0.35
+"""Focal length over the picture's longer side where no camera is told, and its relative u."""
 TURNED_RAD = math.radians(25.0)
 TURNED_TOO_FAR_RAD = math.radians(40.0)
 FEW_PX = 10.0
@@ -57,7 +60,7 @@ def faces(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]:
 
     Args:
         photo: the picture.
-        search: `targets`, `thorough` and `progress` of it are heeded.
+        search: `targets`, `camera`, `thorough` and `progress` of it are heeded.
 
     Returns:
         Lengths "face 1 eyes" and "face 1 iris": ends from left to right as they stand in the picture of an upright face.
@@ -66,6 +69,7 @@ def faces(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]:
         MissingExtraError: the networks are not installed.
     """
     search = search or Search()
+    camera = search.camera
     eyes_target, iris_target = _wanted(search.targets)
     if eyes_target is None and iris_target is None:
         return ()
@@ -76,9 +80,9 @@ def faces(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]:
         if abs(face.eyes_turned_rad) > TURNED_TOO_FAR_RAD:
             continue
         if eyes_target is not None:
-            out += _eyes(photo, face, contrasts, eyes_target, f"face {number} eyes")
+            out += _eyes(photo, camera, face, contrasts, eyes_target, f"face {number} eyes")
         if iris_target is not None:
-            out += _iris(photo, face, contrasts, iris_target, f"face {number} iris")
+            out += _iris(photo, camera, face, contrasts, iris_target, f"face {number} iris")
     return tuple(out)
 
 
@@ -92,7 +96,12 @@ def _wanted(stated: tuple[KnownTarget, ...]) -> tuple[KnownTarget | None, KnownT
 
 
 def _eyes(
-    photo: Photo, face: Face, contrasts: list[tuple[float, float]], target: KnownTarget, label: str
+    photo: Photo,
+    camera: Camera | None,
+    face: Face,
+    contrasts: list[tuple[float, float]],
+    target: KnownTarget,
+    label: str,
 ) -> list[Detection]:
     ends = np.stack([eye.centre_px for eye in face.eyes])
     length = float(np.hypot(*(ends[1] - ends[0])))
@@ -107,7 +116,7 @@ def _eyes(
                           "where the pupils are is told by the rest of the face",
                           "take a picture with open, well lit eyes"))  # fmt: skip
     notes += _turned(face.eyes_turned_rad)
-    turn = _to_picture(photo, face, face.eyes_turned_rad,
+    turn = _to_picture(photo, camera, face, face.eyes_turned_rad,
                        math.hypot(TURN_SIGMA_RAD, TURN_SIGMA * face.eyes_turned_rad), "turn of the head")  # fmt: skip
     observation = Observation(ends, sigma / math.sqrt(2), label=label, score=face.score, source="network: face mesh")
     return [Detection(observation, "length", target, tilt=turn, notes=tuple(notes))]
@@ -121,7 +130,12 @@ def _turned(angle_rad: float) -> list[Note]:
 
 
 def _iris(
-    photo: Photo, face: Face, contrasts: list[tuple[float, float]], target: KnownTarget, label: str
+    photo: Photo,
+    camera: Camera | None,
+    face: Face,
+    contrasts: list[tuple[float, float]],
+    target: KnownTarget,
+    label: str,
 ) -> list[Detection]:
     """The width of the irises, about the one that is seen better; nothing where none can be seen."""
     seen = [i for i, eye in enumerate(face.eyes) if _width_is_seen(eye, contrasts[i])]
@@ -138,7 +152,7 @@ def _iris(
         notes.append(Note("small_iris", f"the iris is only {width:.1f} px wide", "come closer, or use a longer lens"))
     notes += _turned(face.eyes_turned_rad)
     sigma = math.hypot(math.hypot(IRIS_SIGMA * width, IRIS_SIGMA_PX) / math.sqrt(len(seen)), IRIS_TOO_WIDE_U * width)
-    tilt = _to_picture(photo, face, gaze, GAZE_SIGMA_RAD, "direction of gaze")
+    tilt = _to_picture(photo, camera, face, gaze, GAZE_SIGMA_RAD, "direction of gaze")
     observation = Observation(ends, sigma / math.sqrt(2), label=label, score=face.score, source="network: iris")
     return [Detection(observation, "length", target, tilt=tilt, notes=tuple(notes))]
 
@@ -166,22 +180,21 @@ def _gaze_in_head(face: Face) -> float:
     return math.asin(max(-1.0, min(1.0, sum(found) / 2 / EYE_RADIUS_M)))
 
 
-def _to_picture(photo: Photo, face: Face, turned_rad: float, u_rad: float, what: str) -> Quantity:
+def _to_picture(
+    photo: Photo, camera: Camera | None, face: Face, turned_rad: float, u_rad: float, what: str
+) -> Quantity:
     """An angle to what faces the viewer as one to the image plane: less the angle of the line of sight along the eyes."""
     middle = (face.eyes[0].centre_px + face.eyes[1].centre_px) / 2
-    off_px = float((middle - np.array([(photo.width_px - 1) / 2, (photo.height_px - 1) / 2])) @ _along(face))
-    f_px, u_relative = _rough_focal_px(photo)
-    sight = math.atan2(off_px, f_px)
+    if camera is None:
+        off_px = middle - np.array([(photo.width_px - 1) / 2, (photo.height_px - 1) / 2])
+        slope, u_relative = off_px / (USUAL_FOCAL * max(photo.width_px, photo.height_px)), USUAL_FOCAL_U
+    else:
+        slope, u_relative = np.concatenate(camera.slopes(middle[None])), camera.u_f_px / float(camera.f_px)
+    sight = math.atan(float(slope @ _along(face)))
+    if math.isnan(sight):  # the camera's numbers give no direction here; its method will say so
+        sight = 0.0
     u_sight = u_relative * abs(math.sin(sight) * math.cos(sight))
     return Quantity.normal(turned_rad - sight, math.hypot(u_rad, u_sight), "rad", f"network: {what}")
-
-
-def _rough_focal_px(photo: Photo) -> tuple[float, float]:
-    """A focal length, px, good enough for the angle of a line of sight, and its relative u."""
-    equivalent = photo.metadata.f35_mm
-    if equivalent is not None and 8 <= equivalent <= 2000:
-        return equivalent / 43.27 * math.hypot(photo.width_px, photo.height_px), 0.1
-    return 0.9 * max(photo.width_px, photo.height_px), 0.35
 
 
 def _inside(photo: Photo, points_px: Array) -> bool:
