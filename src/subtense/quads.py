@@ -94,7 +94,7 @@ def _segments(gray: Pixels) -> Array:
     ends = np.asarray(found, float).reshape(-1, 2, 2)
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
     order = np.argsort(-length)
-    return ends[order[length[order] >= 0.6 * SHORTEST_PX]][:MOST_SEGMENTS]
+    return np.asarray(ends[order[length[order] >= 0.6 * SHORTEST_PX]][:MOST_SEGMENTS])
 
 
 def _lines(segments: Array) -> Array:
@@ -110,7 +110,7 @@ def _lines(segments: Array) -> Array:
     every = np.array([_span(segments, group) for group in (*groups, *single)]).reshape(-1, 2, 2)
     length = np.hypot(*(every[:, 1] - every[:, 0]).T)
     order = np.argsort(-length)
-    return every[order[length[order] >= SHORTEST_PX]][:MOST_LINES]
+    return np.asarray(every[order[length[order] >= SHORTEST_PX]][:MOST_LINES])
 
 
 def _grown(segments: Array, seed: int) -> list[int]:

@@ -41,12 +41,14 @@ class KindFit:
         target: the kind.
         chi2: of aspect and right angle, 2 degrees of freedom; the least over what the camera may be.
         likelihood: density of what was seen, for ranking kinds.
+        u_aspect: relative standard deviation of the aspect as seen.
         first: which corner is the target's top-left, 0 or 1; its width then runs to the next corner.
     """
 
     target: KnownTarget
     chi2: float
     likelihood: float
+    u_aspect: float
     first: int
 
 
@@ -89,6 +91,7 @@ def kind_fits(
         kinds: with the shape "rectangle".
     """
     told = [(_numbers(camera, corners_px, cov), weight) for camera, weight in cameras]
+    u_aspect = _spread_of_aspect(told)
     found = []
     for kind in kinds:
         assert kind.width is not None and kind.height is not None
@@ -98,7 +101,7 @@ def kind_fits(
         first = int(np.argmax([likelihood for _, likelihood in fits]))
         chi2, likelihood = fits[first]
         if chi2 < GATE and likelihood > 0:
-            found.append(KindFit(kind, chi2, likelihood, first))
+            found.append(KindFit(kind, chi2, likelihood, u_aspect, first))
     return sorted(found, key=lambda fit: -fit.likelihood)
 
 
@@ -115,6 +118,22 @@ def _weighed(told: Sequence[tuple[tuple[Array, Array], float]], log_aspect: floa
         least = min(least, chi2)
         total += weight * math.exp(-min(chi2, 1400.0) / 2) / math.sqrt(determinant)
     return least, total
+
+
+def _spread_of_aspect(told: Sequence[tuple[tuple[Array, Array], float]]) -> float:
+    """Standard deviation of the logarithm of the aspect, over the cameras that leave the corners right angles."""
+    values, weights = [], []
+    for (value, spread), weight in told:
+        if np.all(np.isfinite(value)) and np.all(np.isfinite(spread)):
+            right = math.exp(-min(value[1] ** 2 / spread[1, 1], 1400.0) / 2) + 1e-12
+            # known right angles tell the aspect better where the two vary together
+            values.append((value[0], spread[0, 0] - spread[0, 1] ** 2 / spread[1, 1]))
+            weights.append(weight * right)
+    if not values:
+        return math.inf
+    mean, variance = np.array(values).T
+    middle = np.average(mean, weights=weights)
+    return math.sqrt(float(np.average(np.maximum(variance, 0.0) + (mean - middle) ** 2, weights=weights)))
 
 
 def _numbers(camera: Camera, corners: Array, cov: Array) -> tuple[Array, Array]:

@@ -19,11 +19,13 @@ from .corners import meeting
 from .edges import LEAST_STEP, WORST_MISFIT, Patch, piece
 from .subpixel import CORNER_SIGMA_PX, CURVED_FROM_PX, SIDE_SIGMA_PX, WIDEST_STRIP_PX, Side
 
-MOST_PIECES = 20
+MOST_PIECES = 16
 LEAST_PIECES = 3
 SHORTEST_PIECE_PX = 5.0
 PIECE_SIGMA_PX = 0.05
 """How far a piece may lie off the side, whatever its residuals say."""
+QUICK_SIGMA_PX = 0.5
+"""Of a piece that is not located in linear light."""
 ON_LINE_PX = 1.0
 
 
@@ -44,7 +46,9 @@ class Straight:
     stretch: tuple[float, float]
 
 
-def straight(patch: Patch, start_px: Array, end_px: Array, *, reach_px: float, margin: float = 0.08) -> Straight | None:
+def straight(
+    patch: Patch, start_px: Array, end_px: Array, *, reach_px: float, margin: float = 0.08, fine: bool = True
+) -> Straight | None:
     """The straight edge between two rough ends.
 
     Args:
@@ -53,6 +57,7 @@ def straight(patch: Patch, start_px: Array, end_px: Array, *, reach_px: float, m
         end_px: (2,).
         reach_px: how far from the rough line.
         margin: share of the length at either end that is left out, for rounded corners.
+        fine: whether the pieces are located in linear light; else to about half a pixel, a hundred times as fast.
 
     Returns:
         None where fewer than three pieces lie on a line.
@@ -72,6 +77,8 @@ def straight(patch: Patch, start_px: Array, end_px: Array, *, reach_px: float, m
     if on_line is None or len({k for k, _, _, _ in on_line}) < max(LEAST_PIECES, 0.2 * count):
         return None
     half = float(np.clip(length / 12, 2.0, WIDEST_STRIP_PX))
+    if not fine:
+        return _quick(patch, start, along, across, on_line, (length, size, count))
     return _fitted(patch, start, along, across, on_line, (length, size, half, count))
 
 
@@ -160,6 +167,21 @@ def _fitted(
     return Straight(side, float(kept.sum()) / count, float(np.sign(data[kept, 6]).mean()), reach)
 
 
+def _quick(
+    patch: Patch, start: Array, along: Array, across: Array, on_line: list[Proposal], sizes: tuple[float, float, int]
+) -> Straight | None:  # fmt: skip
+    length, size, count = sizes
+    t, n, step = (np.array([p[i] for p in on_line]) for i in (1, 2, 3))
+    ones = np.ones_like(t)
+    found = _line(np.stack([t, n, QUICK_SIGMA_PX**2 * ones, 0 * ones, abs(step), 0 * ones, np.sign(step)], -1), length)
+    if found is None:
+        return None
+    bend, cov, by_curve, kept = found
+    side = Side(start - patch.origin_px, along, across, bend, cov, float(np.median(abs(step))), 0.0, by_curve)
+    reach = (float(t[kept].min() - size / 2) / length, float(t[kept].max() + size / 2) / length)
+    return Straight(side, float(kept.sum()) / count, float(np.sign(step[kept]).mean()), reach)
+
+
 def _row(patch: Patch, found: Side, start: Array, along: Array, across: Array, middle: Array) -> list[float]:
     """Place along and across, variance, change with the curve, contrast, misfit, and the sign of the light side."""
     t = float((middle - patch.origin_px - found.start) @ found.along)
@@ -225,29 +247,34 @@ class Outline:
     sides: tuple[Straight, ...]
 
 
-def outline(patch: Patch, corners_px: Array, *, reach_px: float) -> Outline | None:
+def outline(patch: Patch, corners_px: Array, *, reach_px: float, fine: bool = True) -> Outline | None:
     """The four straight sides near a rough quadrilateral, and their corners with covariance.
 
     Args:
         patch: the cut-out, with some px around the quadrilateral.
         corners_px: (4, 2) in order around, px of the picture.
         reach_px: how far the sides may lie from the rough ones.
+        fine: whether in linear light; else to about half a pixel, for a first look.
     """
-    corners, sides = np.asarray(corners_px, float), []
-    for reach in (reach_px, 3.0):  # the second pass has its pieces where the sides are
-        found = [straight(patch, corners[i], corners[(i + 1) % 4], reach_px=reach) for i in range(4)]
-        sides = [one for one in found if one is not None]
-        if len(sides) < 4:
-            return None
-        try:
-            moved = np.array([meeting(sides[i - 1].side, sides[i].side) for i in range(4)]) + patch.origin_px
-        except np.linalg.LinAlgError:
-            return None
-        if not np.all(np.isfinite(moved)) or np.max(np.hypot(*(moved - corners).T)) > 3 * reach_px + 10:
-            return None
-        corners = moved
+    quick = _placed(patch, np.asarray(corners_px, float), reach_px, fine=False)
+    if quick is None or not fine:
+        return quick
+    return _placed(patch, quick.corners_px, 3.0, fine=True)
+
+
+def _placed(patch: Patch, corners: Array, reach: float, *, fine: bool) -> Outline | None:
+    found = [straight(patch, corners[i], corners[(i + 1) % 4], reach_px=reach, fine=fine) for i in range(4)]
+    sides = [one for one in found if one is not None]
+    if len(sides) < 4:
+        return None
+    try:
+        moved = np.array([meeting(sides[i - 1].side, sides[i].side) for i in range(4)]) + patch.origin_px
+    except np.linalg.LinAlgError:
+        return None
+    if not np.all(np.isfinite(moved)) or np.max(np.hypot(*(moved - corners).T)) > 3 * reach + 10:
+        return None
     cov = _covariance(patch, sides)
-    return Outline(corners, cov, tuple(sides)) if np.all(np.isfinite(cov)) else None
+    return Outline(moved, cov, tuple(sides)) if np.all(np.isfinite(cov)) else None
 
 
 def _covariance(patch: Patch, sides: list[Straight]) -> Array:

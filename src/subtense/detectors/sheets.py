@@ -17,8 +17,9 @@ import numpy as np
 
 from ..arrays import Array, Pixels
 from ..board_points.gray import FINDING_PX, Reduced, gray_of, reduced
+from ..camera import Camera
 from ..detection import Detection, Search
-from ..edges import Patch
+from ..edges import LEAST_STEP, Patch
 from ..observation import Observation
 from ..photo import Photo
 from ..quads import Rough, distinct, quads
@@ -29,19 +30,39 @@ from ..targets import KnownTarget, targets
 
 GROUPS = ("paper", "card", "banknote", "plate", "sign", "media", "own")
 """Of data/targets.toml; rows of a person's own file are in `own`."""
+UNASKED = ("paper", "card", "banknote", "plate")
+"""Groups whose kinds are named where nothing was told."""
 PICTURE_PX = 640
 """Smaller pictures are enlarged for finding: segments of few pixels are not seen."""
 MOST_ENLARGED = 4.0
 ROUGH_PX = 1.5
 """Standard deviation of a corner of the reduced picture."""
-MOST_LOCATED = 14
-"""Quadrilaterals whose sides are located."""
+QUICK_PX = 0.5
+"""The same after a quick look at the sides."""
+MOST_ROUGH = 400
+MOST_LOOKED_AT = 100
+MOST_LOCATED = 10
+"""Quadrilaterals that are found, looked at quickly, and located."""
+TELLS_LITTLE = 0.1
+"""Relative standard deviation of the aspect beyond which it says little of the kind."""
 HIDDEN = 0.8
 """Share of a side that must be seen for its being whole to go without a note."""
+LEAST_RADIUS_PX = 2.5
+"""Smaller radii are lost in the blur."""
 CARD_ROUNDING = 3.18 / 85.6
 """Radius of a bank card's corners over its width (ISO/IEC 7810)."""
 ROUNDING_WITHIN = (0.6, 1.5)
 """Of that: how far a measured radius may be off."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Located:
+    """A quadrilateral with its sides located, and the kinds that fit."""
+
+    shape: Outline
+    patch: Patch
+    rough: Rough
+    fits: list[KindFit]
 
 
 @dataclass(frozen=True)
@@ -72,11 +93,11 @@ def sheets(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]:
     if search.targets and not told:
         return ()
     cameras = [(search.camera, 1.0)] if search.camera else usual_cameras(photo.width_px, photo.height_px)
-    kinds = told or tuple(one for one in targets().values() if one.shape == "rectangle" and one.group in GROUPS)
+    kinds = told or tuple(one for one in targets().values() if one.shape == "rectangle" and one.group in UNASKED)
     gray = gray_of(photo.pixels)
     for number, picture in enumerate(_pictures(gray, several=bool(told) or search.thorough)):
         for mixed in (False, True) if told else (False,):
-            found = _found(photo, gray, picture, search, (cameras, kinds), told=bool(told), mixed=mixed)
+            found = _found(photo, picture, search, (cameras, kinds), told=bool(told), mixed=mixed)
             search.progress(min(1.0, 0.4 * (number + 1) + 0.2 * mixed))
             if found:
                 return tuple(sorted(found, key=lambda one: float(one.seen.points_px[:, 0].mean())))
@@ -97,41 +118,55 @@ def _pictures(gray: Pixels, *, several: bool) -> list[Reduced]:
     return [reduced(gray, side) for side in sides]
 
 
-Choice = tuple[Sequence[tuple[object, float]], Sequence[KnownTarget]]
+Choice = tuple[Sequence[tuple[Camera, float]], Sequence[KnownTarget]]
+"""What the camera may be, with weights, and the kinds that are looked for."""
 
 
 def _found(
-    photo: Photo, gray: Pixels, picture: Reduced, search: Search, choice: tuple, *, told: bool, mixed: bool
+    photo: Photo, picture: Reduced, search: Search, choice: Choice, *, told: bool, mixed: bool
 ) -> list[Detection]:  # fmt: skip
     cameras, kinds = choice
-    rough = []
-    spread = (ROUGH_PX / min(picture.scale_x, picture.scale_y)) ** 2 * np.eye(8)
-    for one in distinct(quads(picture.pixels, mixed=mixed), 3.0):
-        corners = picture.full(one.corners_px)
-        if not _inside(photo, corners):
+    rules = WILLING if told else STRICT
+    located: list[_Located] = []
+    tried = 0
+    for one, corners in _candidates(photo, picture, choice, mixed=mixed):
+        patch = _patch(photo, corners, search, 2.0 + 2.0 / picture.scale_x)
+        quick = outline(patch, corners, reach_px=2.0 + 2.0 / picture.scale_x, fine=False)
+        if quick is None or not _seen_enough(quick, rules, one.light) or not kind_fits(
+            quick.corners_px, quick.cov + QUICK_PX**2 * np.eye(8), cameras, kinds
+        ):  # fmt: skip
             continue
-        fits = kind_fits(corners, spread, cameras, kinds)
-        if fits and (told or _plain(picture.pixels, one) or _is_card_like(fits)):
-            rough.append((one, corners))
-    located: list[tuple[Outline, Patch, Rough, list[KindFit]]] = []
-    for one, corners in rough[:MOST_LOCATED]:
-        patch, shape = _located(photo, corners, search, 2.0 + 2.0 / picture.scale_x)
-        if shape is None or not _seen_enough(shape, WILLING if told else STRICT, one.light):
+        if any(_overlap(quick.corners_px, other.shape.corners_px) for other in located):
             continue
-        if any(_overlap(shape.corners_px, other.corners_px) for other, _, _, _ in located):
+        tried += 1
+        if tried > MOST_LOCATED:
+            break
+        shape = outline(patch, quick.corners_px, reach_px=3.0)
+        if shape is None or not _seen_enough(shape, rules, one.light):
             continue
         fits = kind_fits(shape.corners_px, shape.cov, cameras, kinds)
         if fits:
-            located.append((shape, patch, one, fits))
+            located.append(_Located(shape, patch, one, fits))
     if told:
         return _told(located)
-    return [d for shape, patch, one, fits in located if (d := _unasked(picture, shape, patch, one, fits)) is not None]
+    return [found for one in located if (found := _unasked(picture, one)) is not None]
 
 
-def _located(photo: Photo, corners: Array, search: Search, reach: float) -> tuple[Patch, Outline | None]:
+def _candidates(photo: Photo, picture: Reduced, choice: Choice, *, mixed: bool) -> list[tuple[Rough, Array]]:
+    """Quadrilaterals that may be one of the kinds, with their corners in full pixels; best seen first."""
+    cameras, kinds = choice
+    spread = (ROUGH_PX / min(picture.scale_x, picture.scale_y)) ** 2 * np.eye(8)
+    found = []
+    for one in distinct(quads(picture.pixels, mixed=mixed)[:MOST_ROUGH], 3.0):
+        corners = picture.full(one.corners_px)
+        if _inside(photo, corners) and kind_fits(corners, spread, cameras, kinds):
+            found.append((one, corners))
+    return found[:MOST_LOOKED_AT]
+
+
+def _patch(photo: Photo, corners: Array, search: Search, reach: float) -> Patch:
     around = reach + 14.0
-    patch = Patch.of(photo.pixels, corners.min(axis=0) - around, corners.max(axis=0) + around, search.curve)
-    return patch, outline(patch, corners, reach_px=reach)
+    return Patch.of(photo.pixels, corners.min(axis=0) - around, corners.max(axis=0) + around, search.curve)
 
 
 def _inside(photo: Photo, corners: Array) -> bool:
@@ -174,10 +209,6 @@ def _plain(gray: Pixels, one: Rough) -> bool:
     return level > 90 and float(np.mean(abs(inside - level) < 0.14 * level)) > 0.55
 
 
-def _is_card_like(fits: Sequence[KindFit]) -> bool:
-    return any(fit.target.name == "id-1" and fit.likelihood > AS_WELL * fits[0].likelihood for fit in fits)
-
-
 # -- what it is ---------------------------------------------------------------------------------------
 
 
@@ -185,57 +216,79 @@ def _as_well(fits: Sequence[KindFit]) -> list[KindFit]:
     return [fit for fit in fits if fit.likelihood > AS_WELL * fits[0].likelihood]
 
 
-def _told(located: Sequence[tuple[Outline, Patch, Rough, list[KindFit]]]) -> list[Detection]:
+def _told(located: Sequence[_Located]) -> list[Detection]:
     """What was told to be there: the kind that fits, where one of those told does."""
     counts: dict[str, int] = {}
-    for _, _, _, fits in located:
-        for fit in _as_well(fits):
+    for one in located:
+        for fit in _as_well(one.fits):
             counts[fit.target.name] = counts.get(fit.target.name, 0) + 1
     found = []
-    for shape, _, _, fits in located:
-        best, *others = _as_well(fits)
-        one = _detection(shape, best, tuple(fit.target for fit in others))
+    for place in located:
+        if place.fits[0].target.name == "id-1" and _rounding(place, place.fits[0]) is False:
+            continue  # a card's corners are round; of a window they are not
+        best, *others = _as_well(place.fits)
+        seen = _detection(place.shape, best, tuple(fit.target for fit in others))
         if not others and counts[best.target.name] > 1:
             text = (f"{counts[best.target.name]} rectangles in the picture fit the {best.target.title}; which of them is one can't be "
                     "told from their shape")  # fmt: skip
             note = Note("several_fit", text, "look at the overlay, and keep the one that is meant")
-            one = _noted(one, note)
-        found.append(one)
+            seen = _noted(seen, note)
+        found.append(seen)
     return found
 
 
-def _unasked(picture: Reduced, shape: Outline, patch: Patch, one: Rough, fits: list[KindFit]) -> Detection | None:
+def _unasked(picture: Reduced, place: _Located) -> Detection | None:
     """What shows itself: a bank card by its corners; else a plain sheet whose size must be told."""
-    as_well = _as_well(fits)
+    as_well = _as_well(place.fits)
     card = next((fit for fit in as_well if fit.target.name == "id-1"), None)
-    if card is not None and _rounded(patch, shape, card):
-        return _detection(shape, card, ())
-    if not _plain(picture.pixels, one):
+    if card is not None and _rounding(place, card) is True:
+        return _detection(place.shape, card, ())
+    if not _plain(picture.pixels, place.rough):
         return None
-    return _detection(shape, as_well[0], tuple(fit.target for fit in as_well), known=False)
+    return _detection(place.shape, as_well[0], tuple(fit.target for fit in as_well), known=False)
 
 
-def _rounded(patch: Patch, shape: Outline, fit: KindFit) -> bool:
-    """Whether the corners are rounded as a bank card's: the edge on a corner's bisector lies 0.41 radii within."""
-    corners = np.roll(shape.corners_px, -fit.first, axis=0)
-    middle, radii = corners.mean(axis=0), []
+def _rounding(place: _Located, fit: KindFit) -> bool | None:
+    """Whether the corners are rounded as a bank card's; None where that can't be seen.
+
+    The edge on a corner's bisector lies 0.41 radii within where the sides meet.
+    """
+    corners = np.roll(place.shape.corners_px, -fit.first, axis=0)
     width = float(np.hypot(*(corners[1] - corners[0])) + np.hypot(*(corners[2] - corners[3]))) / 2
     expected = CARD_ROUNDING * width
-    if expected < 2.5:
-        return False
-    for i, corner in enumerate(corners):
-        to_one, to_other = (corners[(i + k) % 4] - corner for k in (1, 3))
-        inward = to_one / np.hypot(*to_one) + to_other / np.hypot(*to_other)
-        inward = inward / np.hypot(*inward)
-        n = np.arange(-3.0, 1.2 * expected + 4.0, 0.25)
-        profile = patch.values(corner + n[:, None] * inward)
-        level = patch.values(corner + (2.5 * expected) * (middle - corner) / np.hypot(*(middle - corner)))
-        outside = profile[0]
-        crossed = np.flatnonzero(abs(profile - outside) > 0.5 * abs(level - outside))
-        if len(crossed) and abs(level - outside) > 0.08:
-            radii.append(float(n[crossed[0]]) / (math.sqrt(2) - 1))
+    if expected < LEAST_RADIUS_PX:
+        return None
+    found = [_corner_radius(place.patch, corners, i, expected) for i in range(4)]
+    radii = [radius for radius in found if radius is not None]
     low, high = (share * expected for share in ROUNDING_WITHIN)
-    return len(radii) >= 3 and low < float(np.median(radii)) < high
+    return low < float(np.median(radii)) < high if len(radii) >= 3 else None
+
+
+def _corner_radius(patch: Patch, corners: Array, i: int, expected: float) -> float | None:
+    corner, middle = corners[i], corners.mean(axis=0)
+    one, other = (corners[(i + k) % 4] - corner for k in (1, 3))
+    inward = one / np.hypot(*one) + other / np.hypot(*other)
+    n = np.arange(-3.0, 1.2 * expected + 4.0, 0.25)
+    profile = patch.values(corner + n[:, None] * inward / np.hypot(*inward))
+    level = float(patch.values(corner + 2.5 * expected * (middle - corner) / np.hypot(*(middle - corner))))
+    crossed = np.flatnonzero(abs(profile - profile[0]) > 0.5 * abs(level - profile[0]))
+    if not len(crossed) or not abs(level - profile[0]) > 2 * LEAST_STEP:
+        return None
+    return float(n[crossed[0]]) / (math.sqrt(2) - 1)
+
+
+def _detection_notes(shape: Outline, fit: KindFit) -> list[Note]:
+    notes = []
+    hidden = [side.support for side in shape.sides if side.support < HIDDEN]
+    if hidden:
+        text = (f"of {len(hidden)} of its sides no more than {100 * max(hidden):.0f} % was seen; its corners are where the sides "
+                "meet")  # fmt: skip
+        notes.append(Note("partly_hidden", text, "look at the overlay"))
+    if fit.u_aspect > TELLS_LITTLE:
+        text = (f"it is seen so small or so doubtfully that its proportions are known to {100 * fit.u_aspect:.0f} % only; things of "
+                "other proportions would fit as well")  # fmt: skip
+        notes.append(Note("shape_tells_little", text, "look at the overlay, or come closer"))
+    return notes
 
 
 def _detection(shape: Outline, fit: KindFit, others: tuple[KnownTarget, ...], *, known: bool = True) -> Detection:
@@ -249,12 +302,8 @@ def _detection(shape: Outline, fit: KindFit, others: tuple[KnownTarget, ...], *,
     )  # fmt: skip
     if known and others:  # of those told, several fit: none is taken
         others = (fit.target, *others)
-    found = Detection(seen, "rectangle", fit.target if unlike else None, others)
-    hidden = [side.support for side in shape.sides if side.support < HIDDEN]
-    if not hidden:
-        return found
-    text = f"of {len(hidden)} of its sides only {100 * min(hidden):.0f} % or more was seen; its corners are where the sides meet"
-    return _noted(found, Note("partly_hidden", text, "look at the overlay"))
+    notes = tuple(_detection_notes(shape, fit))
+    return Detection(seen, "rectangle", fit.target if unlike else None, others, notes=notes)
 
 
 def _noted(one: Detection, note: Note) -> Detection:
