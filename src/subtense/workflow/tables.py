@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..detection import Detection, Search
-from ..detectors import faces, markers, objects, qr_codes
+from ..detectors import faces, markers, objects, qr_codes, sheets
 from ..method import Method
 from ..methods import calculator, known_distance, known_size, pose, same_plane
 from ..photo import Photo
@@ -51,6 +51,8 @@ DETECTORS: dict[str, Detector] = {
         Detector("faces", "faces, by their eyes", faces.faces, ("body",), extra="networks"),
         Detector("objects", "people, vehicles and household things", objects.objects,
                  ("body", "vehicle", "bottle", "household"), extra="networks"),
+        Detector("sheets", "sheets, cards, plates and signs", sheets.sheets, sheets.GROUPS,
+                 asks="which kind a sheet is, or its width and height"),
     )
 }
 """Ways to see things in a photo by themselves, by name."""
