@@ -15,6 +15,9 @@ from test_decode import dng, heic
 
 from subtense.cli import main
 from subtense.photo import Photo
+from subtense.targets import targets
+from subtense.web.children import ChildError
+from subtense.web.problems import problem_of
 from subtense.workflow.report_of import REPORTS
 from subtense.workflow.tables import DETECTORS, METHODS
 
@@ -521,11 +524,20 @@ def test_a_line_in_a_photo_is_what_the_command_line_prints(server, examples):
     assert error(server.client.post("/api/measure/known_size", json=body))["name"] == "ends"
 
 
+OBSERVED = ("points_px", "sigma_px", "cov", "label", "score", "source")
+
+
+def to_measure(one: dict, size: str | None = None) -> dict:
+    """An item of POST /api/measure, from what a detection says of how it is measured."""
+    told = one["size_prefix"] + size if size else one["size_text"]
+    tilt = {"tilt": one["tilt"]} if one["tilt"] else {}
+    inputs = {one["points_field"]: {key: one[key] for key in OBSERVED}, one["size_field"]: told, **tilt}
+    return {"method": one["method"], "inputs": inputs, "label": one["label"], "notes": one["notes"]}
+
+
 def test_markers_are_what_the_command_line_finds(server, desk, examples):
-    seen = server.client.post("/api/detect/markers", json={"photo": desk["id"]}).json()["observations"]
-    items = [
-        {"method": "pose", "inputs": {"points": one, "target": "square 50 mm"}, "label": one["label"]} for one in seen
-    ]
+    seen = server.client.post("/api/detect/markers", json={"photo": desk["id"]}).json()["detections"]
+    items = [to_measure(one, "50 mm") for one in seen]
     sheet = server.client.post("/api/measure", json={"photo": desk["id"], "items": items}).json()
     expected = printed("measure", examples / "desk.jpg", "--marker-size", "50mm")
     assert len(sheet["measurements"]) == len(expected["measurements"]) > 0
@@ -578,11 +590,104 @@ def test_a_job_tells_its_progress_until_it_is_done(server, desk):
     progress = [data["progress"] for _, data in seen]
     assert progress == sorted(progress) and progress[-1] == 1 and len(set(progress)) > 1
     waited = server.client.post("/api/detect/markers", json={"photo": desk["id"]}).json()
-    assert seen[-1][1]["result"] == waited and len(waited["observations"]) > 0
+    assert seen[-1][1]["result"] == waited and len(waited["detections"]) > 0
+    assert seen[-2][1]["doing"] == DETECTORS["markers"].title
     assert server.client.get(f"/api/jobs/{job['id']}").json() == seen[-1][1]
     assert [name for name, _ in events(server, job["id"])] == ["done"]
     assert server.client.delete(f"/api/jobs/{job['id']}").status_code == 204  # it has ended, and stays as it is
     assert server.client.get(f"/api/jobs/{job['id']}").json()["state"] == "done"
+
+
+def test_everything_that_looks_unasked_is_found_at_once(server, desk):
+    """The thing that a network takes for a cup is measured, and says that its size is assumed."""
+    found = server.client.post("/api/detect/all", json={"photo": desk["id"]}).json()
+    by = {one["detector"] for one in found["detections"]}
+    assert "markers" in by and by <= {name for name, row in DETECTORS.items() if row.automatic}
+    for one in found["detections"]:
+        assert (one["target"] is None) == (one["size_text"] is None)
+        codes = [note["code"] for note in one["notes"]]
+        assert ("assumed_size" in codes) == (one["target"] is not None)
+    sized = [to_measure(one) for one in found["detections"] if one["size_text"]]
+    sheet = server.client.post("/api/measure", json={"photo": desk["id"], "items": sized}).json()
+    heads = [m for m in sheet["measurements"] if m["what"] == "range"]
+    assert len(heads) == len(sized) and all("assumed_size" in [n["code"] for n in m["notes"]] for m in heads)
+
+
+def test_what_a_person_says_narrows_the_search(server, desk):
+    body = {"photo": desk["id"], "targets": ["cup"]}
+    for one in server.client.post("/api/detect/all", json=body).json()["detections"]:
+        assert one["detector"] != "markers"
+        assert one["target"] != "cup" or "assumed_size" not in [note["code"] for note in one["notes"]]
+    seen = {}
+    for curve in (None, "linear", "2.6"):
+        answer = server.client.post(
+            "/api/detect/markers", json={"photo": desk["id"], "family": "36h11", "curve": curve}
+        )
+        [seen[curve]] = answer.json()["detections"]
+    assert len({json.dumps(one["points_px"]) for one in seen.values()}) == 3
+
+
+@pytest.mark.parametrize(
+    ("said", "field", "words"),
+    [({"targets": ["no such thing"]}, "targets", "known are"), ({"targets": ["floor-to-floor"]}, "targets", "known are"),
+     ({"family": "0h0"}, "family", "36h11"), ({"curve": "9"}, "curve", "between 0.4 and 4"),
+     ({"camera": "no such camera"}, "camera", "known are"), ({"thorough": "yes"}, "thorough", "bool"),
+     ({"targets": ["a4"] * 51}, "targets", "50")],
+)  # fmt: skip
+def test_a_search_that_can_not_be_made_says_which_word_is_wrong(server, desk, said, field, words):
+    body = {"photo": desk["id"], **said}
+    for answer in (
+        server.client.post("/api/detect/all", json=body),
+        server.client.post("/api/jobs", json={**body, "detector": "all"}),
+    ):
+        found = error(answer)
+        assert found["name"].startswith(field) and words in found["message"]
+
+
+def test_a_kind_that_nothing_finds_is_told_from_one_that_is_not_known(server, desk):
+    name = next(t.name for t in targets().values() if not any(t.group in row.groups for row in DETECTORS.values()))
+    found = error(server.client.post("/api/detect/all", json={"photo": desk["id"], "targets": [name]}))
+    assert found["name"] == "targets" and "nothing finds it" in found["message"]
+    found = error(server.client.post("/api/detect/markers", json={"photo": desk["id"], "targets": ["cup"]}))
+    assert found["name"] == "targets"
+
+
+def test_a_missing_extra_of_a_child_keeps_its_status():
+    status, found = problem_of(ChildError("MissingExtraError", "needs an extra", "networks"))
+    assert (status, found["type"], found["name"]) == (501, "MissingExtraError", "networks")
+
+
+def test_marked_points_go_to_the_edges_near_them(server, desk):
+    """The corners of the sheet on the desk, marked by hand."""
+    marked = [[396.0, 371.0], [746.0, 369.5]]
+    body = {"photo": desk["id"], "points_px": marked}
+    found = server.client.post("/api/snap", json=body).json()
+    seen = found["observation"]
+    assert np.shape(seen["cov"]) == (4, 4) and np.sqrt(np.diag(seen["cov"])).max() < 0.5
+    assert np.hypot(*(np.array(seen["points_px"]) - marked).T).max() < 10
+    assert found["notes"][0]["code"] == "snapped"
+    one = server.client.post("/api/snap", json={**body, "points_px": marked[:1]}).json()
+    assert one["observation"]["points_px"][0] == pytest.approx([394.4, 372.3], abs=1)
+    item = {"inputs": {"ends": seen, "size": "210 mm"}, "photo": desk["id"], "notes": found["notes"]}
+    m = server.client.post("/api/measure/known_size", json=item).json()["measurements"][0]
+    assert "snapped" in [note["code"] for note in m["notes"]]
+
+
+def test_snapping_where_nothing_is_says_so(server, desk):
+    flat = server.photo(encoded(np.full((60, 80, 3), 128, np.uint8)), "flat.png")
+    body = {"photo": flat["id"], "points_px": [[20, 20]]}
+    found = error(server.client.post("/api/snap", json=body))
+    assert found["type"] == "NothingFoundError" and "no corner" in found["message"]
+    for points, word in (([[200, 20]], "in the picture"), ([[20, 20], [20, 20]], "")):
+        assert word in error(server.client.post("/api/snap", json={**body, "points_px": points}))["message"]
+    assert error(server.client.post("/api/snap", json={**body, "curve": "x"}))["name"] == "curve"
+    assert error(server.client.post("/api/snap", json={**body, "points_px": []}))["name"] == "points_px"
+
+
+def encoded(pixels: np.ndarray) -> bytes:
+    out = io.BytesIO()
+    Image.fromarray(pixels).save(out, "PNG")
+    return out.getvalue()
 
 
 def test_a_cancelled_job_leaves_no_process(server):

@@ -505,3 +505,4 @@ def test_the_child_writes_in_its_own_folder_only(tmp_path):
                  "os.rename('../other/there', 'mine')"):  # fmt: skip
         assert in_child(f"import os\nprint(tried(lambda: {what}))", own) in ("13", "18"), what  # EACCES, EXDEV
     assert (other / "there").read_text() == "kept" and len(list(other.iterdir())) == 1
+    assert in_child("print(open('/dev/null', 'w').write('lost'))", own) == "4"  # by which networks are silenced

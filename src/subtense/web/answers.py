@@ -197,10 +197,41 @@ class Observation(_Answer):
     id: str | None = None
 
 
-class Observations(_Answer):
-    """What a detector sees."""
+class Detection(Observation):
+    """One thing found, and how it is measured.
 
-    observations: list[Observation]
+    Put the observation into the field `points_field` of `method`, and its size into `size_field`.
+    """
+
+    detector: str = Field(description="who found it")
+    shape: Literal["square", "rectangle", "length", "circle", "sphere"]
+    target: str | None = Field(
+        description="what its size is taken to be, of GET /api/targets; null where it must be told"
+    )
+    others: list[str] = Field(description="further targets that fit as well")
+    tilt: dict[str, Any] | None = Field(description="of a length, for the field tilt, where it is known")
+    notes: list[Doubt] = Field(
+        description="for `notes` of the measurement; assumed_size falls away where the size is told"
+    )
+    method: str
+    points_field: str
+    size_field: str
+    size_prefix: str = Field(description="stands before a size that is told, as in 'square 50 mm'")
+    size_text: str | None = Field(description="the size of its target, as size_field takes it")
+
+
+class Detections(_Answer):
+    """What was found."""
+
+    detections: list[Detection]
+    notes: list[Doubt] = Field(description="detectors that could not be asked")
+
+
+class Snapped(_Answer):
+    """The points at the edges near them, with their joint covariance, and what is doubtful about that."""
+
+    observation: Observation
+    notes: list[Doubt]
 
 
 class Fault(_Answer):
@@ -219,5 +250,6 @@ class Job(_Answer):
     kind: str
     state: Literal["running", "done", "failed", "cancelled"]
     progress: float = Field(ge=0, le=1)
-    result: Observations | None
+    doing: str = Field(description="what is looked for now")
+    result: Detections | None
     error: Fault | None

@@ -2,7 +2,7 @@
 
 It has no network, a bounded address space, processor time and file size, no standard input, and an empty folder of its own,
 where alone it may write.
-It prints one JSON object a line: {"progress": share}, and at last {"result": ...} or {"error": {...}}.
+It prints one JSON object a line: {"progress": share, "doing": what}, and at last {"result": ...} or {"error": {...}}.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Pixels
-from ..errors import SubtenseError
+from ..errors import InputError, MissingExtraError, SubtenseError
 
 SPARE_BYTES = 64 * 2**20
 """What a decoder needs at the least, beside what this process has when it starts."""
@@ -42,9 +42,13 @@ def main() -> None:
 
 
 def fault(error: SubtenseError, limits: dict[str, int]) -> dict[str, Any]:
-    """The error, and which limit it is about, if one."""
+    """The error, and which limit, field or extra it is about, if one."""
     name, text = None, str(error)
-    if isinstance(error.__context__, MemoryError):
+    if isinstance(error, InputError):
+        name = error.name.lstrip("-").replace("-", "_")
+    elif isinstance(error, MissingExtraError):
+        name = error.extra
+    elif isinstance(error.__context__, MemoryError):
         name, text = "memory_bytes", f"{text}; {limits['memory_bytes'] // 2**20} MiB are allowed (memory_bytes)"
     elif "million; the limit is" in text:
         name, text = "pixels", f"{text} (pixels)"
@@ -113,7 +117,8 @@ def deny_network() -> bool:
 
 
 def write_only_in(folder: Path) -> bool:
-    """On Linux 5.13 or later: a Landlock rule by which files are made and changed below a folder only; False where there is none."""
+    """On Linux 5.13 or later: a Landlock rule by which files are made and changed below a folder only, and what is written to
+    /dev/null is lost as ever (networks are silenced by it); False where there is none."""
     if sys.platform != "linux":
         return False
     libc = _unprivileged()
@@ -123,10 +128,13 @@ def write_only_in(folder: Path) -> bool:
     rights = 1 << 1 | sum(1 << bit for bit in range(4, 13))  # write; remove and make entries of every kind
     rights |= (1 << 13 if version >= 2 else 0) | (1 << 14 if version >= 3 else 0)  # move between folders; truncate
     ruleset = libc.syscall(444, ctypes.create_string_buffer(struct.pack("Q", rights), 8), 8, 0)
-    place = os.open(folder, os.O_PATH | os.O_DIRECTORY)
-    rule = ctypes.create_string_buffer(struct.pack("=Qi", rights, place), 12)
-    made = bool(ruleset >= 0 and libc.syscall(445, ruleset, 1, rule, 0) == 0 and libc.syscall(446, ruleset, 0) == 0)
-    os.close(place)
+    made = ruleset >= 0
+    for place, allowed in ((folder, rights), (Path(os.devnull), 1 << 1 | rights & 1 << 14)):
+        handle = os.open(place, os.O_PATH)
+        rule = ctypes.create_string_buffer(struct.pack("=Qi", allowed, handle), 12)
+        made = bool(made and libc.syscall(445, ruleset, 1, rule, 0) == 0)
+        os.close(handle)
+    made = bool(made and libc.syscall(446, ruleset, 0) == 0)
     if ruleset >= 0:
         os.close(ruleset)
     return made
@@ -184,17 +192,34 @@ def _pyramid(pixels: Pixels, tile_px: int) -> list[tuple[int, int]]:
     return sizes
 
 
-def detect(task: dict[str, Any]) -> list[dict[str, Any]]:
-    """Search the decoded picture whose pixels are in `path`, with a row of DETECTORS."""
+def detect(task: dict[str, Any]) -> dict[str, Any]:
+    """Search the decoded picture whose pixels are in `path`, with a row of DETECTORS or all that look unasked."""
+    from ..camera import Camera
+    from ..detection import Search, parse_curve, unknown_curve
     from ..photo import Metadata, Photo
+    from ..targets import find_target
     from ..workflow.detect import detect as detect_in
     from ..workflow.detect import detection_json
+    from ..workflow.measure import assumed
 
     width, height = task["size"]
     pixels = np.memmap(task["path"], np.uint8, "r", shape=(height, width, 3))
     photo = Photo(pixels, Metadata(), Path(task["name"]), "")
-    found = detect_in(photo, [task["detector"]], progress=lambda title, share: say(progress=share))
-    return [detection_json(one) for one in found.detections]
+    stated = tuple(find_target(name) for name in task["targets"])
+    search = Search(
+        stated, task["family"], parse_curve(task["curve"]) if task["curve"] else unknown_curve(), task["thorough"],
+        camera=Camera.from_json(task["camera"]) if task["camera"] else None,
+    )  # fmt: skip
+    found = detect_in(photo, task["only"], search, progress=lambda title, share: say(progress=share, doing=title))
+    detections = [
+        {
+            **detection_json(one),
+            "detector": by,
+            "notes": [note.to_json() for note in (*assumed(one, stated), *one.notes)],
+        }
+        for one, by in zip(found.detections, found.detectors, strict=True)
+    ]
+    return {"detections": detections, "notes": [note.to_json() for note in found.notes]}
 
 
 TASKS = {"decode": decode, "detect": detect}

@@ -25,7 +25,11 @@ _NO_MEMORY = (
 """What a child complains that got too little."""
 
 
-def unwatched(_: float) -> None:
+Progress = Callable[[float, str], None]
+"""Is told the share done, and what is being done."""
+
+
+def unwatched(share: float, doing: str) -> None:
     """Progress that nobody looks at."""
 
 
@@ -79,7 +83,7 @@ class Children:
 
     async def run(
         self, task: dict[str, Any], folder: Path, *, cpu_s: float, wall_s: float, file_bytes: int, memory_bytes: int,
-        progress: Callable[[float], None] = unwatched,
+        progress: Progress = unwatched,
     ) -> Any:  # fmt: skip
         """What a child makes of a task in a folder; it is ended when this is cancelled.
 
@@ -116,13 +120,13 @@ class Children:
 
     async def _outcome(
         self, process: asyncio.subprocess.Process, complaints: asyncio.Task[str], name: str, cpu_s: float, memory_bytes: int,
-        progress: Callable[[float], None],
+        progress: Progress,
     ) -> Any:  # fmt: skip
         assert process.stdout is not None
         async for line in process.stdout:
             said = _said(line)
             if "progress" in said:
-                progress(float(said["progress"]))
+                progress(float(said["progress"]), str(said.get("doing", "")))
             elif "error" in said:
                 raise ChildError(said["error"]["type"], said["error"]["message"], said["error"]["name"])
             elif "result" in said:

@@ -27,6 +27,7 @@ class Job:
         kind: what it does.
         state: "running", "done", "failed" or "cancelled".
         progress: share done, 0 to 1.
+        doing: what it is at.
         result: of a job that is done.
         error: of one that failed.
     """
@@ -35,6 +36,7 @@ class Job:
     kind: str
     state: str = "running"
     progress: float = 0.0
+    doing: str = ""
     result: Any = None
     error: dict[str, Any] | None = None
     task: asyncio.Task[None] | None = field(default=None, repr=False)
@@ -42,12 +44,12 @@ class Job:
 
     def to_json(self) -> dict[str, Any]:
         """As the API gives it."""
-        return {"id": self.id, "kind": self.kind, "state": self.state, "progress": self.progress, "result": self.result,
-                "error": self.error}  # fmt: skip
+        return {"id": self.id, "kind": self.kind, "state": self.state, "progress": self.progress, "doing": self.doing,
+                "result": self.result, "error": self.error}  # fmt: skip
 
-    def moved(self, share: float) -> None:
-        """So much is done."""
-        self.progress = max(self.progress, min(share, 1.0))
+    def moved(self, share: float, doing: str = "") -> None:
+        """So much is done, and what it is at."""
+        self.progress, self.doing = max(self.progress, min(share, 1.0)), doing or self.doing
         self.tell()
 
     def tell(self) -> None:

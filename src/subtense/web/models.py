@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..assumptions import CLICK_SIGMA_PX
+
 _ID = "c5d4c6d0ffae35b1dd6dec8353c2868e"
 """That of examples/desk.jpg."""
 Typed = Annotated[str, Field(max_length=200)]
@@ -82,6 +84,17 @@ class OfPhoto(_Body):
 _INPUTS = {"camera": "1600x1200, f=1500 ± 10 px", "ends": "120,80;640,80 ± 0.5px", "size": "200 ± 0.5 mm"}
 
 
+class Doubt(_Body):
+    """A note that goes with a measurement, as a detector tells it of what it found."""
+
+    code: Annotated[str, Field(pattern="^[a-z0-9_]{1,50}$")]
+    text: Annotated[str, Field(max_length=1000)]
+    cure: Annotated[str, Field(max_length=1000)] = ""
+
+
+Doubts = Annotated[list[Doubt], Field(max_length=20, description="about what was seen; they go with the measurement")]
+
+
 class Measure(_Evaluated):
     """The inputs of one method; with a photo, its camera and the defaults of `assumptions` are filled in."""
 
@@ -89,6 +102,7 @@ class Measure(_Evaluated):
         description="as GET /api/methods describes them: each an object, or text as it is typed"
     )
     label: Annotated[str, Field(max_length=100)] = ""
+    notes: Doubts = Field(default_factory=list)
     photo: PhotoId | None = None
     camera: GivenCamera = None
 
@@ -101,6 +115,7 @@ class Item(_Body):
     method: Annotated[str, Field(max_length=100)]
     inputs: dict[str, Any]
     label: Annotated[str, Field(max_length=100)] = ""
+    notes: Doubts = Field(default_factory=list)
 
 
 class Sheet(_Evaluated):
@@ -114,22 +129,46 @@ class Sheet(_Evaluated):
         "ends": "120,80;640,80", "size": "200 mm"}, "label": "shelf"}]})  # fmt: skip
 
 
-class Search(_Body):
-    """A detector's work."""
+class Search(OfPhoto):
+    """What to look for in a photo, and what is known beside it."""
 
-    photo: PhotoId
+    targets: Annotated[
+        list[Typed], Field(max_length=50, description="kinds of GET /api/targets that are in the picture")
+    ] = Field(default_factory=list)
+    family: Typed | None = Field(None, description="of markers, as 36h11; null for all")
+    curve: Typed | None = Field(None, description="the picture's transfer curve: srgb, linear, or an exponent, as 2.2")
+    thorough: bool = Field(False, strict=True, description="search the full resolution where a coarse one would do")
 
-    model_config = _shown({"photo": _ID})
+    model_config = _shown({"photo": _ID, "curve": "srgb"})
 
 
-class NewJob(_Body):
+class NewJob(Search):
     """Long work: a search in a photo."""
 
     kind: Literal["detect"] = "detect"
-    detector: Annotated[str, Field(max_length=100)]
-    photo: PhotoId
+    detector: Annotated[
+        str,
+        Field(max_length=100, description="of GET /api/methods; all for those that look unasked, or find the targets"),
+    ]
 
     model_config = _shown({"kind": "detect", "detector": "markers", "photo": _ID})
+
+
+class Snap(_Body):
+    """Points that were marked by hand."""
+
+    photo: PhotoId
+    points_px: Annotated[
+        list[Annotated[list[float], Field(min_length=2, max_length=2)]],
+        Field(min_length=1, max_length=20, description="two are the ends of a line; any other number are corners"),
+    ]
+    sigma_px: float = Field(
+        CLICK_SIGMA_PX, strict=True, gt=0, le=1000, description="standard deviation of a marked point"
+    )
+    radius_px: float | None = Field(None, strict=True, ge=1, le=200, description="how far from a point is looked")
+    curve: Typed | None = Field(None, description="the picture's transfer curve: srgb, linear, or an exponent, as 2.2")
+
+    model_config = _shown({"photo": _ID, "points_px": [[394, 372], [748, 368]]})
 
 
 class Keep(_Body):

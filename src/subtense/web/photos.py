@@ -6,7 +6,6 @@ import asyncio
 import shutil
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ import numpy as np
 from ..arrays import Pixels
 from ..photo import Metadata, Photo
 from ..quantity import Note
-from .children import ChildError, Children, unwatched
+from .children import ChildError, Children, Progress, unwatched
 from .settings import Limits
 
 TILE_PX = 512
@@ -105,9 +104,7 @@ class Photos:
                 self.drop(held.id)
                 total, count = total - held.bytes, count - 1
 
-    async def add(
-        self, source: Path, name: str, *, kept: bool = False, progress: Callable[[float], None] = unwatched
-    ) -> Held:
+    async def add(self, source: Path, name: str, *, kept: bool = False, progress: Progress = unwatched) -> Held:
         """Decode a file (it is moved into the private folder, or copied if `kept`) and hold the photo.
 
         Raises:

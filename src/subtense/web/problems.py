@@ -46,7 +46,7 @@ def problem_of(error: Exception) -> tuple[int, dict[str, Any]]:
         found |= {"name": error.name.lstrip("-").replace("-", "_").replace(" ", "_"), "given": _shown(error.given)}
         return 422, found
     if isinstance(error, ChildError):
-        return 422, {**found, "type": error.kind, "name": error.limit}
+        return 501 if error.kind == "MissingExtraError" else 422, {**found, "type": error.kind, "name": error.limit}
     if isinstance(error, MissingExtraError):
         return 501, {**found, "name": error.extra}
     if isinstance(error, GeometryError):

@@ -6,16 +6,24 @@ import tempfile
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from fastapi import APIRouter, Request
 from fastapi import Path as InPath
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
+from ..detection import parse_curve, unknown_curve
+from ..detectors.markers import FAMILIES
 from ..errors import InputError, UnknownCameraError
+from ..observation import Observation
+from ..quantity import Note
+from ..targets import find_target
 from ..workflow.calculator_of import calculator_of
+from ..workflow.detect import detectors_for
 from ..workflow.in_photo import Item, measure_item, measure_items
 from ..workflow.measure import camera_document, no_camera_document
+from ..workflow.snap import snapped
 from ..workflow.tables import DETECTORS, METHODS
 from . import answers as shapes
 from . import models
@@ -29,6 +37,8 @@ from .state import camera_for, held, state_of
 from .uploads import read_form, shown_name
 
 router = APIRouter(prefix="/api")
+ALL = "all"
+"""Instead of a detector's name: those that look unasked, or find the targets that are said."""
 Id = Annotated[str, InPath(pattern="^[0-9a-f]{32}$", description="from POST /api/photos")]
 _UPLOAD = {
     "requestBody": {
@@ -169,7 +179,7 @@ def _known(camera: Any) -> Any:
 def post_sheet(request: Request, body: models.Sheet, form: Format = "json") -> Response:
     """An item that has no answer becomes a note `refused`, and does not lose the others."""
     photo = held(request, body.photo)
-    items = [Item(_method(one.method), one.inputs, one.label) for one in body.items]
+    items = [Item(_method(one.method), one.inputs, one.label, _notes(one.notes)) for one in body.items]
     document = measure_items(
         items, photo.photo, camera_for(state_of(request), photo, body.camera), level=body.level, seed=body.seed
     )
@@ -183,9 +193,13 @@ def post_measure(request: Request, method: Annotated[str, InPath(max_length=100)
     """Inputs as GET /api/methods describes them. With a photo its camera is filled in, and points must lie in it."""
     photo = held(request, body.photo) if body.photo else None
     camera = camera_for(state_of(request), photo, body.camera) if photo else None
-    item = Item(_method(method), body.inputs, body.label)
+    item = Item(_method(method), body.inputs, body.label, _notes(body.notes))
     document = measure_item(item, photo.photo if photo else None, camera, level=body.level, seed=body.seed)
     return shown(document, form, photo.photo if photo else None)
+
+
+def _notes(doubts: list[models.Doubt]) -> tuple[Note, ...]:
+    return tuple(Note(one.code, one.text, one.cure) for one in doubts)
 
 
 def _method(name: str) -> Any:
@@ -197,45 +211,81 @@ def _method(name: str) -> Any:
 # -- searches --------------------------------------------------------------------------------------------
 
 
-async def _search(request: Request, detector: str, photo: Held, job: Job | None = None) -> list[dict[str, Any]]:
-    """What a row of DETECTORS sees, by a child process."""
+async def _search(request: Request, photo: Held, task: dict[str, Any], job: Job | None = None) -> dict[str, Any]:
+    """What rows of DETECTORS see, by a child process."""
     state = state_of(request)
     limits = state.settings.limits
-    pixels = photo.levels[0]
-    task = {"do": "detect", "detector": detector, "name": photo.photo.name, "path": str(photo.folder / "pixels.bin"),
-            "size": [pixels.shape[1], pixels.shape[0]]}  # fmt: skip
     async with state.children.place():
-        found: list[dict[str, Any]] = await state.children.run(
+        found: dict[str, Any] = await state.children.run(
             task, photo.folder, cpu_s=limits.job_s, wall_s=limits.job_s, file_bytes=2**20, memory_bytes=2 * limits.memory_bytes,
             progress=job.moved if job else unwatched,
         )  # fmt: skip
     return found
 
 
-def _detector(name: str) -> str:
-    if name not in DETECTORS:
-        raise InputError("detector", name, f"known are {', '.join(DETECTORS)}")
-    return name
+def _task(request: Request, name: str, photo: Held, body: models.Search) -> dict[str, Any]:
+    """What a child is told: all that a person said, checked here, where a wrong word costs nothing."""
+    if name != ALL and name not in DETECTORS:
+        raise InputError("detector", name, f"known are {ALL}, {', '.join(DETECTORS)}")
+    if body.family is not None and body.family not in FAMILIES:
+        raise InputError("family", body.family, f"known are {', '.join(FAMILIES)}")
+    try:
+        wanted = [find_target(text, "targets") for text in body.targets]
+        only = [] if name == ALL else [name]
+        detectors_for(only, wanted)
+        if body.curve is not None:
+            parse_curve(body.curve)
+    except InputError as error:
+        field = {"--target": "targets", "--curve": "curve"}.get(error.name, error.name)
+        raise InputError(field, error.given, error.allowed) from None
+    camera = camera_for(state_of(request), photo, body.camera)
+    pixels = photo.levels[0]
+    return {
+        "do": "detect", "only": only, "name": photo.photo.name, "path": str(photo.folder / "pixels.bin"),
+        "size": [pixels.shape[1], pixels.shape[0]], "targets": [one.name for one in wanted], "family": body.family,
+        "curve": body.curve, "thorough": body.thorough,
+        "camera": None if isinstance(camera, UnknownCameraError) else camera.camera.to_json(),
+    }  # fmt: skip
 
 
-@router.post("/detect/{name}", summary="Find targets in a photo", responses=gives(shapes.Observations))
+@router.post("/detect/{name}", summary="Find things in a photo", responses=gives(shapes.Detections))
 async def post_detect(request: Request, name: Annotated[str, InPath(max_length=100)], body: models.Search) -> Response:
-    """Waits for the outcome; as a job, POST /api/jobs, it tells its progress and can be cancelled."""
+    """By one detector, or `all`; `targets` narrows what is looked for, and says what is there.
+
+    Waits for the outcome; as a job, POST /api/jobs, it tells its progress and can be cancelled.
+    """
     photo = held(request, body.photo)
-    return JSONResponse({"observations": await _search(request, _detector(name), photo)})
+    return JSONResponse(await _search(request, photo, _task(request, name, photo, body)))
 
 
 @router.post("/jobs", summary="Start long work", status_code=202, responses=gives(shapes.Job, 202))
 async def post_job(request: Request, body: models.NewJob) -> Response:
     """Gives its id at once."""
-    photo, name = held(request, body.photo), _detector(body.detector)
+    photo = held(request, body.photo)
+    task = _task(request, body.detector, photo, body)
     state = state_of(request)
     state.children.check()
 
     async def work(job: Job) -> dict[str, Any]:
-        return {"observations": await _search(request, name, photo, job)}
+        return await _search(request, photo, task, job)
 
-    return JSONResponse(state.jobs.start(f"detect {name}", work).to_json(), 202)
+    return JSONResponse(state.jobs.start(f"detect {body.detector}", work).to_json(), 202)
+
+
+@router.post("/snap", summary="Move marked points to the edges near them", responses=gives(shapes.Snapped))
+def post_snap(request: Request, body: models.Snap) -> Response:
+    """The two ends of a line go to the edges it crosses there; any other number of points go to corners."""
+    photo = held(request, body.photo)
+    marked = Observation(np.array(body.points_px), body.sigma_px)
+    limit = np.array([photo.photo.width_px, photo.photo.height_px]) - 0.5
+    if np.any(marked.points_px < -0.5) or np.any(marked.points_px > limit):
+        raise InputError("points_px", str(body.points_px), "all points must lie in the picture")
+    try:
+        curve = parse_curve(body.curve) if body.curve is not None else unknown_curve()
+    except InputError as error:
+        raise InputError("curve", error.given, error.allowed) from None
+    found, notes = snapped(photo.photo, marked, curve, radius_px=body.radius_px)
+    return JSONResponse({"observation": found.to_json(), "notes": [note.to_json() for note in notes]})
 
 
 JobId = Annotated[str, InPath(pattern="^[A-Za-z0-9_-]{16}$")]

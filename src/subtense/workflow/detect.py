@@ -13,6 +13,7 @@ from ..photo import Photo
 from ..quantity import Note, Quantity
 from ..target import Target
 from ..targets import KnownTarget
+from .grade import graded
 from .in_photo import Item
 from .resolve_camera import resolve_camera
 from .tables import DETECTORS, METHODS, Detector
@@ -52,10 +53,12 @@ class Found:
     Attributes:
         detections: of all detectors that were asked, in the order of the table.
         notes: detectors that could not be asked, and why.
+        detectors: who found each detection, by name.
     """
 
     detections: tuple[Detection, ...]
     notes: tuple[Note, ...] = ()
+    detectors: tuple[str, ...] = ()
 
 
 def detectors_for(only: Sequence[str], targets: Sequence[KnownTarget]) -> list[Detector]:
@@ -97,17 +100,21 @@ def detect(
     search = _with_camera(photo, search or Search())
     rows = detectors_for(only, search.targets)
     found: list[Detection] = []
+    by: list[str] = []
     notes: list[Note] = []
     for number, row in enumerate(rows):
         told = dataclasses.replace(search, progress=_part(progress, row.title, number, len(rows)))
         told.progress(0.0)
         try:
-            found += row.function(photo, told)
+            seen = row.function(photo, told)
         except MissingExtraError as error:
             if only or search.targets:
                 raise
             notes.append(Note("not_searched", f"{row.title} were not looked for: {error}"))
-    return Found(tuple(_told_apart(found)), tuple(notes))
+            continue
+        found += [graded(photo, one) for one in seen]
+        by += [row.name] * len(seen)
+    return Found(tuple(_told_apart(found)), tuple(notes), tuple(by))
 
 
 def _with_camera(photo: Photo, search: Search) -> Search:

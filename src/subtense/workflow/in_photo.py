@@ -40,11 +40,13 @@ class Item:
         method: of METHODS.
         inputs: field to JSON of its noun, or to the text a person typed.
         label: its name.
+        notes: doubts about what was seen, which go with the measurement.
     """
 
     method: Method
     inputs: Mapping[str, Any]
     label: str = ""
+    notes: tuple[Note, ...] = ()
 
 
 def measure_item(
@@ -65,7 +67,7 @@ def measure_item(
     """
     inputs = item_inputs(item, photo, camera)
     found = propagate.measure(item.method, inputs, level=level, seed=seed, label=item.label, given=given(inputs))
-    doubts = (*found[0].notes, *_distortion_unknown(inputs))
+    doubts = (*found[0].notes, *_distortion_unknown(inputs), *item.notes)
     headed = [dataclasses.replace(found[0], notes=doubts), *(dataclasses.replace(m, notes=()) for m in found[1:])]
     return _document(photo, camera, _camera_of(inputs), headed, _shapes(item, inputs))
 
