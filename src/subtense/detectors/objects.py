@@ -28,6 +28,9 @@ from ..targets import KnownTarget
 
 HEAD_SIGMA, SOLE_SIGMA = 0.012, 0.015
 """Of the ends of a person's pixels, shares of the height: 0.006 and 0.007 of most, more of a few (benchmarks/boxes.py)."""
+AHEAD, AHEAD_SIGMA = 0.012, 0.012
+"""How much the lowest pixel lies below the sole under the body's middle, share of the height: it is the toe of a foot that is
+d nearer, so d / Z h / H for a camera h above the ground; 0.15 ± 0.1 m, 1.5 m of 1.7 m, 5 to 20 m away."""
 EDGE_SIGMA = 0.05
 """Of the upper and lower edge of a box, share of its height (benchmarks/boxes.py)."""
 PIXEL_SIGMA = 0.5
@@ -44,6 +47,12 @@ COVERED = 0.12
 """Share of a box that a nearer thing may cover before its lower edge is no longer trusted."""
 NEAR_BORDER = 0.03
 """Of its height: a box that ends nearer to the border of the picture may be cut by it."""
+
+LEVEL = Note(
+    "level_view_assumed",
+    "taken to be seen from about its own height; from farther above its top is seen too, and it is farther away than this says",
+    "mark a length that you know at its near end with --line and --size",
+)
 
 Taken = Mapping[str, tuple[KnownTarget, ...]]
 
@@ -116,10 +125,12 @@ def _person(
 def _standing(photo: Photo, thing: Thing, body: Body, again: Body, taken: tuple[KnownTarget, ...]) -> Detection:
     """Head and sole: the means of two looks; what they differ by is in their sigma."""
     middle, height = (body.left_px + body.right_px) / 2, body.height_px
-    ends = np.array([[middle, (body.top_px + again.top_px) / 2], [middle, (body.bottom_px + again.bottom_px) / 2]])
+    top, bottom = (body.top_px + again.top_px) / 2, (body.bottom_px + again.bottom_px) / 2 - AHEAD * height
+    ends = np.array([[middle, top], [middle, bottom]])
     floor = PIXEL_SIGMA * max(body.pixel, 1.0)
     apart = np.array(disagreement(body, again))
-    sigma = np.sqrt((np.array([HEAD_SIGMA, SOLE_SIGMA]) * height) ** 2 + floor**2 + (apart / 2) ** 2)
+    share = np.array([HEAD_SIGMA, math.hypot(SOLE_SIGMA, AHEAD_SIGMA)])
+    sigma = np.sqrt((share * height) ** 2 + floor**2 + (apart / 2) ** 2)
     observation = Observation(_inside(ends, photo), sigma, label=PERSON.name, score=thing.score, source="objects")
     return Detection(observation, "length", taken[0], taken[1:])
 
@@ -170,7 +181,7 @@ def _thing(photo: Photo, kind: Kind, thing: Thing, seen: Sequence[Thing], taken:
         text = f"not measured by its usual height: {why}"
         note = Note("object_cut", text, "take a picture that shows all of it") if why else None
         return _unsized(photo, kind, thing, note)
-    return Detection(_ends(photo, kind, thing), "length", taken[0], taken[1:])
+    return Detection(_ends(photo, kind, thing), "length", taken[0], taken[1:], notes=(LEVEL,) if kind.deep else ())
 
 
 def _partial(photo: Photo, kind: Kind, thing: Thing, seen: Sequence[Thing]) -> str:

@@ -21,6 +21,7 @@ class Kind:
         stated: further rows that a person may say it is.
         across: whether the width is measured in place of the height.
         least: score from which it is shown.
+        deep: whether it reaches away from the camera, so that from above more than its height is seen.
         aspect: limits of width over height of a whole one.
     """
 
@@ -30,6 +31,7 @@ class Kind:
     others: tuple[str, ...] = ()
     stated: tuple[str, ...] = ()
     across: bool = False
+    deep: bool = False
     least: float = 0.45
     aspect: tuple[float, float] = (0.0, math.inf)
 
@@ -53,16 +55,16 @@ RIDDEN = ("bicycle", "motorcycle", "motorbike", "stationary bicycle")
 """Labels of what a person may sit on with straight legs."""
 KINDS = (
     PERSON,
-    Kind("car", ("car",), "car", ("van",), ("van",), aspect=(1.0, 3.6)),
-    Kind("bus", ("bus",), "bus"),
-    Kind("lorry", ("truck",), "truck", ("van",), ("van",)),
-    Kind("van", ("van",), "van"),
-    Kind("vehicle", ("vehicle",), stated=("van", "truck", "bus", "motorcycle")),
+    Kind("car", ("car",), "car", ("van",), ("van",), deep=True, aspect=(1.0, 3.6)),
+    Kind("bus", ("bus",), "bus", deep=True),
+    Kind("lorry", ("truck",), "truck", ("van",), ("van",), deep=True),
+    Kind("van", ("van",), "van", deep=True),
+    Kind("vehicle", ("vehicle",), stated=("van", "truck", "bus", "motorcycle"), deep=True),
     Kind("motorcycle", ("motorcycle", "motorbike"), "motorcycle"),
     Kind("bicycle", ("bicycle",), "bicycle", ("bicycle-child",), ("bicycle-child",), aspect=(0.3, 2.2)),
     Kind("bottle", ("bottle",), "bottle", aspect=(0.15, 0.75)),
     Kind("cup", ("mug", "coffee cup", "cup"), "cup", aspect=(0.5, 2.2)),
-    Kind("chair", ("chair",), "chair", aspect=(0.4, 1.6)),
+    Kind("chair", ("chair",), "chair", deep=True, aspect=(0.4, 1.6)),
     Kind("laptop", ("laptop",), "laptop", across=True, aspect=(0.9, 2.5)),
 )
 """What is measured of people comes from their joints; of the others, from their boxes."""

@@ -181,12 +181,19 @@ def _whole_in(box: Array, left: float, top: float, side: float, pixels: Pixels) 
 def distinct(found: Sequence[Thing]) -> list[Thing]:
     """One box for each thing of a label, best first: of those that overlap, or lie inside a better one, the best."""
     kept: list[Thing] = []
-    for one in sorted(found, key=lambda thing: -thing.score):
-        same = [other for other in kept if other.label == one.label]
-        inside = any(one.covered_by(other) >= INSIDE for other in same)
-        if not inside and (not same or overlaps(one.box_px, np.stack([o.box_px for o in same])).max() < SAME):
-            kept.append(one)
-    return kept
+    for label in sorted({one.label for one in found}):
+        left = sorted((one for one in found if one.label == label), key=lambda thing: -thing.score)
+        boxes = np.stack([one.box_px for one in left])
+        areas = np.maximum(np.prod(np.clip(boxes[:, 2:] - boxes[:, :2], 0, None), axis=-1), 1e-9)
+        free = np.ones(len(left), bool)
+        for i in range(len(left)):
+            if not free[i]:
+                continue
+            kept.append(left[i])
+            low, high = np.maximum(boxes[i, :2], boxes[:, :2]), np.minimum(boxes[i, 2:], boxes[:, 2:])
+            inside = np.prod(np.clip(high - low, 0, None), axis=-1) / areas
+            free &= (overlaps(boxes[i], boxes) < SAME) & (inside < INSIDE)
+    return sorted(kept, key=lambda thing: -thing.score)
 
 
 def one_label(found: Sequence[Thing], general: str = "Vehicle") -> list[Thing]:
