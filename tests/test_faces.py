@@ -193,3 +193,11 @@ def test_without_a_camera_the_tilt_is_less_certain(selfies):
     known, unknown = faces(selfies[0], Search(camera=CAMERA))[0].tilt, faces(selfies[0])[0].tilt
     assert unknown.u > known.u
     assert abs(float(unknown.value) - float(known.value)) < 2 * math.sqrt(unknown.u**2 - known.u**2)
+
+
+def test_what_looks_like_a_face_at_first_is_none(shared_data):
+    """Markers of a board and parts of a motorcycle get scores of faces; a look from farther away shows what they are."""
+    board = sorted((shared_data / "calibration" / "charuco_1280").glob("*.jpg"))[:3]
+    motorcycle = sorted((shared_data / "stereo" / "middlebury_motorcycle").glob("*.png"))[:2]
+    for path in (*board, *motorcycle):
+        assert find_faces(np.array(Image.open(path).convert("RGB")), thorough=True) == (), path.name
