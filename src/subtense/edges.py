@@ -158,6 +158,8 @@ def edges_in(patch: Patch, point: Array, d: Array, radius_px: float, strip_px: f
         gaps = [abs(n - other) for other, _, size in peaks if other != n and abs(size) > TELLING_SHARE * abs(step)]
         half = float(np.clip(0.6 * min(gaps, default=99.0), 1.6, WIDEST_STRIP_PX))
         edge = _located(patch, point, d, (n, angle, step), half, strip_px)
+        if edge is None and half > 3.0:  # a rim, a line beside it: nearer to the edge it is a step
+            edge = _located(patch, point, d, (n, angle, step), half / 2, strip_px)
         if edge is None or edge.away_px > radius_px + 0.5:
             continue
         if not any(abs((edge.point_px - other.point_px) @ d) < 1.0 for other in found):

@@ -218,23 +218,36 @@ def _as_well(fits: Sequence[KindFit]) -> list[KindFit]:
 
 def _told(located: Sequence[_Located]) -> list[Detection]:
     """What was told to be there: the kind that fits, where one of those told does."""
+    likely = _likely(located)
     counts: dict[str, int] = {}
-    for one in located:
-        for fit in _as_well(one.fits):
+    for _, fits in likely:
+        for fit in fits:
             counts[fit.target.name] = counts.get(fit.target.name, 0) + 1
     found = []
-    for place in located:
-        if place.fits[0].target.name == "id-1" and _rounding(place, place.fits[0]) is False:
-            continue  # a card's corners are round; of a window they are not
-        best, *others = _as_well(place.fits)
+    for place, (best, *others) in likely:
         seen = _detection(place.shape, best, tuple(fit.target for fit in others))
         if not others and counts[best.target.name] > 1:
             text = (f"{counts[best.target.name]} rectangles in the picture fit the {best.target.title}; which of them is one can't be "
                     "told from their shape")  # fmt: skip
-            note = Note("several_fit", text, "look at the overlay, and keep the one that is meant")
-            seen = _noted(seen, note)
+            seen = _noted(seen, Note("several_fit", text, "look at the overlay, and keep the one that is meant"))
         found.append(seen)
     return found
+
+
+def _likely(located: Sequence[_Located]) -> list[tuple[_Located, list[KindFit]]]:
+    """Each place with the kinds it may be; not those that another place shows far more clearly."""
+    round_or_unseen = [one for one in located
+                       if one.fits[0].target.name != "id-1" or _rounding(one, one.fits[0]) is not False]  # fmt: skip
+    best: dict[str, float] = {}
+    for one in round_or_unseen:
+        for fit in one.fits:
+            best[fit.target.name] = max(best.get(fit.target.name, 0.0), fit.likelihood)
+    pairs = []
+    for one in round_or_unseen:
+        fits = [fit for fit in _as_well(one.fits) if fit.likelihood > AS_WELL * best[fit.target.name]]
+        if fits:
+            pairs.append((one, fits))
+    return pairs
 
 
 def _unasked(picture: Reduced, place: _Located) -> Detection | None:
