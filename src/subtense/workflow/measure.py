@@ -23,6 +23,7 @@ from ..target import Target
 from ..targets import KnownTarget
 from .detect import Found, detect, item_of
 from .given import inputs_from_json, inputs_from_text, read_json
+from .grade import graded_line
 from .in_photo import Item, measure_item
 from .resolve_camera import CAMERA_SOURCES, Resolved, resolve_camera
 
@@ -52,11 +53,13 @@ def measure_lines(
         _check_inside(photo, line)
     resolved = resolve_camera(photo, camera)
     each = list(sizes) * len(lines) if len(sizes) == 1 else list(sizes)
-    items = []
+    documents = []
     for number, (line, size) in enumerate(zip(lines, each, strict=True), 1):
         label = line.label or (f"line {number}" if len(lines) > 1 else "")
-        items.append(Item(known_size.METHOD, {"ends": line, "size": size, **({"tilt": tilt} if tilt else {})}, label))
-    return joined([measure_item(item, photo, resolved, level=level, seed=seed) for item in items])
+        seen, doubts = graded_line(photo, line)
+        item = Item(known_size.METHOD, {"ends": seen, "size": size, **({"tilt": tilt} if tilt else {})}, label)
+        documents.append(_with_notes(measure_item(item, photo, resolved, level=level, seed=seed), doubts))
+    return joined(documents)
 
 
 def measure_markers(
