@@ -32,6 +32,8 @@ BLURRED_FROM_PX = 2.0
 """Standard deviation of the blur from which it is noted: three times that of a sharp lens. Between narrow bars it shows less."""
 MOTION_RATIO = 2.0
 """Long over short axis of the blur from which it is taken for motion."""
+MOTION_FROM_PX = 1.5
+"""Long axis from which it is."""
 LEAST_CONTRAST = 0.06
 """Encoded contrast (0 to 1) of an edge below which it is noted."""
 LEAST_CONTRAST_TO_NOISE = 5.0
@@ -337,7 +339,7 @@ def _blocks(pixels: Pixels, points: Array) -> float:
 def _notes(found: Quality) -> tuple[Note, ...]:
     notes = []
     noise, contrast = found.noise, found.contrast
-    moved = found.blur_long_px > max(MOTION_RATIO * found.blur_short_px, BLURRED_FROM_PX)
+    moved = found.blur_long_px > max(MOTION_RATIO * found.blur_short_px, MOTION_FROM_PX)
     if moved:
         notes.append(Note("motion_blurred", f"edges there are blurred by {found.blur_long_px:.2g} px in one direction and "
                           f"{found.blur_short_px:.2g} px in the other (1s): the camera or the thing moved",
