@@ -40,7 +40,6 @@ OFF = 0.6
 """Of the contrast: residuals that count no more."""
 LEAST_SEEN = 0.88
 """Share of a pattern that must be as it should."""
-CLUMP_PX = 3
 MOST_TERMS = 6
 LEAST_TERM = 0.02
 """Terms of the series are left out from where their powers of the correlation are smaller."""
@@ -219,22 +218,46 @@ def _model(patch: _Patch, x: Array) -> tuple[Array, Array]:
     """Encoded values, and their derivatives (k, parameters)."""
     count = len(x) - _OTHERS
     h, rest = x[:count], x[count:]
-    a, b, size_a, size_b, rho, d = _cell_places(h, patch.xy, bends=patch.bends)
-    blur = float(np.hypot(rest[_BLUR], PIXEL_BLUR))
-    n = len(patch.dark)
-    in_a, by_a, wide_a, z_a, phi_a = _blurred(a, blur / patch.unit_px * size_a, n)
-    in_b, by_b, wide_b, z_b, phi_b = _blurred(b, blur / patch.unit_px * size_b, n)
-    along_a, along_b = in_b @ patch.dark, in_a @ patch.dark.T  # what remains to be summed over a, over b
-    dark = np.einsum("ki,ki->k", along_a, in_a) + _correlated(patch, rho, z_a, phi_a, z_b, phi_b)
-    share = np.clip(1 - dark, 0.0, 1.0)  # of light
-    value, per_share, others = _encoded(patch, share, rest)
+    place, (a, b, d) = _shares(patch, x)
+    value, per_share, others = _encoded(patch, place.share, rest)
     jac = np.empty((len(value), len(x)))
-    by_a_sum, by_b_sum = np.einsum("ki,ki->k", along_a, by_a), np.einsum("ki,ki->k", along_b, by_b)
-    _by_map(jac, -per_share * by_a_sum, -per_share * by_b_sum, patch.xy, a, b, d, bends=patch.bends)
-    wider = np.einsum("ki,ki->k", along_a, wide_a) + np.einsum("ki,ki->k", along_b, wide_b)
-    jac[:, count + _BLUR] = -per_share * wider * rest[_BLUR] / blur**2
+    _by_map(jac, per_share * place.by_a, per_share * place.by_b, patch.xy, a, b, d, bends=patch.bends)
+    blur2 = float(rest[_BLUR]) ** 2 + PIXEL_BLUR**2
+    jac[:, count + _BLUR] = per_share * place.by_blur * rest[_BLUR] / blur2
     jac[:, count + _LOW :] = others
     return value, jac
+
+
+@dataclass(frozen=True)
+class _Shares:
+    """(k,) share of light at each pixel, and its derivatives by a, b, and the logarithm of the blur."""
+
+    share: Array
+    by_a: Array
+    by_b: Array
+    by_blur: Array
+
+
+def _shares(patch: _Patch, x: Array) -> tuple[_Shares, tuple[Array, Array, Array]]:
+    """The pattern as light, and a, b and the homography's divisor."""
+    count, n = len(x) - _OTHERS, len(patch.dark)
+    a, b, size_a, size_b, rho, d = _cell_places(x[:count], patch.xy, bends=patch.bends)
+    blur = float(np.hypot(x[count + _BLUR], PIXEL_BLUR)) / patch.unit_px
+    in_a, by_a, wide_a, z_a, phi_a = _blurred(a, blur * size_a, n)
+    in_b, by_b, wide_b, z_b, phi_b = _blurred(b, blur * size_b, n)
+    along_a, along_b = in_b @ patch.dark, in_a @ patch.dark.T  # what remains to be summed over a, over b
+    dark = np.einsum("ki,ki->k", along_a, in_a) + _correlated(patch, rho, z_a, phi_a, z_b, phi_b)
+    wider = np.einsum("ki,ki->k", along_a, wide_a) + np.einsum("ki,ki->k", along_b, wide_b)
+    shares = _Shares(np.clip(1 - dark, 0.0, 1.0), -np.einsum("ki,ki->k", along_a, by_a),
+                     -np.einsum("ki,ki->k", along_b, by_b), -wider)  # fmt: skip
+    return shares, (a, b, d)
+
+
+def _along(patch: _Patch, x: Array) -> tuple[Array, Array, Array, Array]:
+    """a and b of each pixel, and the derivatives of its encoded value by them."""
+    place, (a, b, _) = _shares(patch, x)
+    per_share = _encoded(patch, place.share, x[len(x) - _OTHERS :])[1]
+    return a, b, per_share * place.by_a, per_share * place.by_b
 
 
 def _encoded(patch: _Patch, share: Array, rest: Array) -> tuple[Array, Array, Array]:
@@ -324,7 +347,8 @@ def _settled(
         return None
     spare = max(float(weight.sum()) - len(free), 1.0)
     sigma = max(float(np.sqrt(residual**2 @ weight / spare)), LEAST_NOISE)
-    normal, _ = _normal(jac, residual, weight, x, free, curve, sigma / np.sqrt(_clumped(patch, residual * weight)))
+    stray = _stray(patch, x, residual * weight, sigma)
+    normal, _ = _normal(jac, residual, weight, x, free, curve, sigma * np.sqrt(stray))
     cov = np.zeros((len(x), len(x)))
     try:
         cov[np.ix_(free, free)] = np.linalg.inv(normal)
@@ -339,16 +363,24 @@ def _weight(residual: Array, x: Array) -> Array:
     return np.asarray(np.maximum(1 - (residual / limit) ** 2, 0.0) ** 2)
 
 
-def _clumped(patch: _Patch, residual: Array) -> float:
-    """How much less neighbouring residuals tell than if they were independent: 1 / variance of their sums over its due.
+def _stray(patch: _Patch, x: Array, residual: Array, sigma: float) -> float:
+    """How much farther the cells' edges lie off the pattern than the noise alone would put them, as a ratio of variances.
 
-    Sharpening, compression, and a blur of another form leave residuals that are alike in neighbouring pixels.
+    Each cell edge between dark and light has a shift of its own, by least squares over its pixels. An uneven print,
+    a blur of another form, sharpening and compression leave such shifts; the fit's covariance is to hold them.
     """
-    places = np.round(patch.xy * patch.unit_px + patch.middle_px).astype(int) // CLUMP_PX
-    _, block = np.unique(places[:, 0] * 100003 + places[:, 1], return_inverse=True)
-    sums, counts = np.bincount(block, residual), np.bincount(block)
-    due = float(np.mean(residual**2)) * counts.sum()
-    return min(due / max(float(sums @ sums), 1e-12), 1.0)
+    n = len(patch.dark)
+    a, b, by_a, by_b = _along(patch, x)
+    ratios = []
+    for along, across, slope in ((a, b, by_a), (b, a, by_b)):
+        edge = np.clip(np.round(along * n), 0, n).astype(int) * (n + 2) + np.clip(np.floor(across * n) + 1, 0, n + 1).astype(int)
+        information = np.bincount(edge, slope**2, minlength=(n + 1) * (n + 2))
+        pull = np.bincount(edge, slope * residual, minlength=(n + 1) * (n + 2))
+        telling = information > 0.1 * information.max()
+        ratios.append(pull[telling] ** 2 / (information[telling] * sigma**2))
+    found = np.concatenate(ratios)
+    chance = 1 + 2 * np.sqrt(2 / len(found))  # what the mean of so many may come to by noise alone
+    return max(float(np.sum(found)) / max(len(found) - 8, 1) / chance, 1.0)
 
 
 def _normal(

@@ -1,9 +1,9 @@
 """Sub-pixel edges in linear light: the four sides of a dark square on a light ground, and its corners with covariance.
 
 Each side is fitted as a step that was blurred in linear light and then encoded, over the pixels of a strip along it:
-v = (low^g + (high^g - low^g) Phi((n - a - b t - c t^2) / s))^(1/g), with the encoded plateaus low and high linear in t.
-An edge located in encoded values would move by up to 0.8 blur radii into the dark side. The exponent g is that of sRGB; a
-camera's own curve is another, so g carries u, which moves all sides out or in together. (The asymmetry of the edges would
+v = e(l + (h - l) Phi((n - a - b t - c t^2) / s)), with the encoded plateaus e(l) and e(h) linear in t and e the transfer curve.
+An edge located in encoded values would move by up to 0.8 blur radii into the dark side. The curve is that of sRGB; a
+camera's own is another, so its exponent carries u, which moves all sides out or in together. (The asymmetry of the edges would
 tell g, but only through the tails of the blur, which sharpening and demosaicing change; it misled more than it told.)
 Fitting pixels, not interpolated profiles, leaves their noise independent.
 
@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import Array, Pixels
+from .quantity import Quantity
+from .transfer import encoded_of, light_of, slope_of
 
 CURVE = 2.2
 """Exponent of the transfer curve: that of sRGB over most of its range."""
@@ -74,36 +76,40 @@ class Quad:
     contrast: float
 
 
-def refine_quad(gray: Array, corners_px: Array, module_px: float) -> Quad | None:
+def refine_quad(gray: Array, corners_px: Array, module_px: float, curve: Quantity | None = None) -> Quad | None:
     """Refine the corners of a dark square on a light ground.
 
     Args:
         gray: (H, W) encoded luminance, 0 to 1.
         corners_px: (4, 2) rough corners, in order around.
         module_px: width of what is surely plain on either side of the edges (a marker's module).
+        curve: exponent of the transfer curve; None for sRGB with what cameras may differ from it.
 
     Returns:
         The refined quad, or None where a side can't be seen.
     """
     corners = np.asarray(corners_px, float)
     half = float(np.clip(0.5 * module_px, 1.6, WIDEST_STRIP_PX))
+    exponent = CURVE if curve is None else float(curve.value)
     sides: list[Side] = []
     for _ in range(2):  # the second pass has its strips where the sides are
-        sides = _sides(gray, corners, half)
+        sides = _sides(gray, corners, half, exponent)
         if len(sides) < 4:
             return None
         corners = _corners(sides, np.stack([side.bend for side in sides]))
-    cov = _corner_cov(sides, corners)
+    cov = _corner_cov(sides, corners, CURVE_U if curve is None else float(curve.u))
     return Quad(corners, cov, max(side.misfit for side in sides), min(side.contrast for side in sides))
 
 
-def _sides(gray: Array, corners: Array, half: float) -> list[Side]:
+def _sides(gray: Array, corners: Array, half: float, exponent: float) -> list[Side]:
     middle = corners.mean(axis=0)
-    sides = [fit_side(gray, corners[i], corners[(i + 1) % 4], middle, half) for i in range(4)]
+    sides = [fit_side(gray, corners[i], corners[(i + 1) % 4], middle, half, exponent) for i in range(4)]
     return [side for side in sides if side is not None]
 
 
-def fit_side(gray: Array, start: Array, end: Array, inside: Array, half: float) -> Side | None:
+def fit_side(
+    gray: Array, start: Array, end: Array, inside: Array, half: float, exponent: float = CURVE
+) -> Side | None:
     """Fit one side in a strip of +-half px, from a light outside to a dark inside.
 
     Args:
@@ -112,6 +118,7 @@ def fit_side(gray: Array, start: Array, end: Array, inside: Array, half: float) 
         end: (2,) the other.
         inside: (2,) a point on the dark side.
         half: half width of the strip, px.
+        exponent: of the transfer curve.
     """
     length = float(np.hypot(*(end - start)))
     if length < 6:
@@ -130,7 +137,7 @@ def fit_side(gray: Array, start: Array, end: Array, inside: Array, half: float) 
     if not high - low > max(0.05, 2 * scatter):  # no step, or a picture of noise: not worth a fit
         return None
     u = 2 * t / length - 1  # -1 to 1 along the side, for a well-conditioned fit
-    begin = np.array([0.0, 0.0, 0.6, low, high, 0.0, 0.0, CURVE, 0.0])
+    begin = np.array([0.0, 0.0, 0.6, low, high, 0.0, 0.0, exponent, 0.0])
     free = [0, 1, 2, 3, 4, 5, 6] + ([8] if length > CURVED_FROM_PX else [])
     x, cov, sigma = _fit(begin, free, u, n, value)
     if not np.all(np.isfinite(x)) or abs(x[0]) > half or abs(x[2]) > 2.5 * half or not x[4] - x[3] > 0.05:
@@ -196,6 +203,7 @@ def _strip(
 
 
 _DARKEST = 1e-3
+_CURVE_STEP = 1e-4
 
 
 def _edge(x: Array, u: Array, n: Array) -> Array:
@@ -210,21 +218,21 @@ def _edge_parts(x: Array, u: Array, n: Array) -> tuple[Array, ...]:
     z = (n - x[0] - x[1] * u - x[8] * u * u) / blur
     low, high = np.maximum(x[3] + x[5] * u, _DARKEST), np.maximum(x[4] + x[6] * u, _DARKEST)
     step, g = ndtr(z), float(np.clip(x[7], 0.5, 4.0))
-    low_light, high_light = low**g, high**g
+    low_light, high_light = light_of(low, g), light_of(high, g)
     light = low_light + (high_light - low_light) * step
-    return light ** (1 / g), z, step, low, high, low_light, high_light, light
+    return encoded_of(light, g), z, step, low, high, low_light, high_light
 
 
 def _edge_jacobian(x: Array, u: Array, n: Array) -> Array:
     """(samples, 9) derivatives of `_edge`."""
-    value, z, step, low, high, low_light, high_light, light = _edge_parts(x, u, n)
+    value, z, step, low, high, low_light, high_light = _edge_parts(x, u, n)
     blur, g = np.hypot(x[2], PIXEL_BLUR), float(np.clip(x[7], 0.5, 4.0))
-    encode = value / (g * light)
+    encode = 1 / slope_of(np.maximum(value, _DARKEST), g)
     by_place = -encode * (high_light - low_light) * np.exp(-z * z / 2) / np.sqrt(2 * np.pi) / blur
-    by_low = encode * g * low_light / low * (1 - step)
-    by_high = encode * g * high_light / high * step
-    light_by_g = low_light * np.log(low) * (1 - step) + high_light * np.log(high) * step
-    by_g = encode * light_by_g - value * np.log(light) / g**2
+    by_low, by_high = encode * slope_of(low, g) * (1 - step), encode * slope_of(high, g) * step
+    other = g + _CURVE_STEP
+    dark, bright = light_of(low, other), light_of(high, other)
+    by_g = (encoded_of(dark + (bright - dark) * step, other) - value) / _CURVE_STEP
     return np.stack([by_place, by_place * u, by_place * z * x[2] / blur, by_low, by_high, by_low * u, by_high * u, by_g,
                      by_place * u * u], -1)  # fmt: skip
 
@@ -252,7 +260,7 @@ def _tangent(side: Side, bend: Array, t: float) -> Array:
     return np.asarray(side.along + (bend[1] + 2 * bend[2] * t) * side.across)
 
 
-def _corner_cov(sides: list[Side], corners: Array) -> Array:
+def _corner_cov(sides: list[Side], corners: Array, curve_u: float) -> Array:
     """(8, 8) from the sides' covariances, the transfer curve (all sides together) and what the model leaves out."""
     bends = np.stack([side.bend for side in sides])
     cov = np.eye(8) * CORNER_SIGMA_PX**2
@@ -265,6 +273,6 @@ def _corner_cov(sides: list[Side], corners: Array) -> Array:
             moved[i, j] += sd[j]
             jac[:, j] = (_corners(sides, moved) - corners).ravel() / sd[j]
         cov += jac @ own @ jac.T
-    shifted = bends + CURVE_U * np.stack([side.by_curve for side in sides])
+    shifted = bends + curve_u * np.stack([side.by_curve for side in sides])
     outward = (_corners(sides, shifted) - corners).ravel()
     return np.asarray(cov + np.outer(outward, outward))

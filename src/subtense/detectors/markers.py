@@ -122,7 +122,7 @@ def _located(gray: Pixels, corners: Array, read: Reading, curve: Quantity) -> Ob
     pattern = fit_pattern(patch, rough, cells, curve)
     if pattern is not None and pattern.misfit < WORST_PATTERN:
         return Observation(pattern.corners_px + offset, cov=pattern.cov, label=label, source="pattern of the marker")
-    quad = refine_quad(patch, rough, float(np.sqrt(_area(rough))) / len(cells))
+    quad = refine_quad(patch, rough, float(np.sqrt(_area(rough))) / len(cells), curve)
     if quad is None or quad.misfit >= WORST_MISFIT:
         return None
     return Observation(quad.corners_px + offset, cov=quad.cov, label=label, source="edges of the marker")
