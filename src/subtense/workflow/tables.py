@@ -9,13 +9,42 @@ from dataclasses import dataclass
 from ..detection import Detection, Search
 from ..detectors import faces, markers, objects, qr_codes, sheets
 from ..method import Method
-from ..methods import calculator, known_distance, known_size, pose, same_plane
+from ..methods import (
+    calculator,
+    circle,
+    ground_footprint,
+    ground_length,
+    ground_plane,
+    ground_sampling,
+    ground_speed,
+    known_distance,
+    known_size,
+    pose,
+    same_plane,
+    sphere,
+    surveyed_ground,
+)
 from ..photo import Photo
 from .report_of import REPORTS
 from .resolve_camera import CAMERA_SOURCES
 
 METHODS: dict[str, Method] = {
-    m.name: m for m in (calculator.METHOD, known_size.METHOD, known_distance.METHOD, same_plane.METHOD, pose.METHOD)
+    m.name: m
+    for m in (
+        calculator.METHOD,
+        known_size.METHOD,
+        known_distance.METHOD,
+        same_plane.METHOD,
+        pose.METHOD,
+        circle.METHOD,
+        sphere.METHOD,
+        ground_plane.METHOD,
+        ground_length.METHOD,
+        ground_speed.METHOD,
+        ground_sampling.METHOD,
+        ground_footprint.METHOD,
+        surveyed_ground.METHOD,
+    )
 }
 """Ways to measure, by name."""
 
