@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -69,15 +70,43 @@ class Target(Noun):
         return cls(name, corners, max(float(width.u) / w, float(height.u) / h), source=width.source)
 
     @classmethod
+    def plane(cls, text: str, *, name: str = "target", assume: Assume | None = None) -> Self:
+        """Points of a plane, z = 0: `0,0;2.5,0;2.5,1;0,1 m ± 5 mm`, the ± of each coordinate (without one, of the whole size)."""
+        example = "write the places as 'plane 0,0;2.5,0;2.5,1.2;0,1.2 m ± 5 mm'"
+        head, _, tail = re.sub(r"\+/-|\+-", "±", text).partition("±")
+        words = re.fullmatch(r"([-+0-9.eE,;\s]+?)\s*([A-Za-zµ\"']*)\s*", head)
+        try:
+            places = [[float(x) for x in pair.split(",")] for pair in words.group(1).split(";")] if words else []
+        except ValueError:
+            places = []
+        if words is None or len(places) < 4 or any(len(pair) != 2 for pair in places) or not words.group(2):
+            raise InputError(name, text, example)
+        unit = float(Quantity.parse(f"1 {words.group(2)} exact", "m", name=name).value)
+        points = np.column_stack([unit * np.array(places), np.zeros(len(places))])
+        if tail:
+            doubt = Quantity.parse(f"0 {words.group(2)} ± {tail.strip()}", "m", name=name)
+            return cls("reference points", points, sigma_m=float(doubt.u), source=doubt.source)
+        if assume is None:
+            raise InputError(name, text, "say how well the places are known: 'plane 0,0;2.5,0;2.5,1.2;0,1.2 m ± 5 mm'")
+        whole = assume(1.0, 0.0)
+        return cls("reference points", points, float(whole.u), source=whole.source)
+
+    @classmethod
     def parse(cls, text: str, *, name: str = "target", assume: Assume | None = None) -> Self:
-        """Read `square 50 ± 0.2 mm` or `rectangle 297 ± 1 mm x 210 ± 1 mm`; `assume` is of a side without ±."""
+        """Read `square 50 ± 0.2 mm`, `rectangle 297 ± 1 mm x 210 ± 1 mm`, or `plane` and places; `assume` is of a side without ±."""
         shape, _, size = text.strip().partition(" ")
+        if shape == "plane":
+            return cls.plane(size, name=name, assume=assume)
         sides = [Quantity.parse(s, "m", bare="mm", name=name, assume=assume) for s in size.split(" x ")] if size else []
         if shape == "square" and len(sides) == 1:
             return cls.square(sides[0], "square")
         if shape == "rectangle" and len(sides) == 2:
             return cls.rectangle(sides[0], sides[1], "rectangle")
-        raise InputError(name, text, "write 'square 50 ± 0.2 mm' or 'rectangle 297 ± 1 mm x 210 ± 1 mm', or @file.json")
+        raise InputError(
+            name,
+            text,
+            "write 'square 50 ± 0.2 mm' or 'rectangle 297 ± 1 mm x 210 ± 1 mm', 'plane 0,0;...', or @file.json",
+        )
 
     def parts(self) -> tuple[Part, ...]:
         parts = []

@@ -149,6 +149,9 @@ def _made(method: Method, values: Mapping[str, Any]) -> Any:
         raise InputError("inputs", "incomplete", f"{method.name} also needs {', '.join(missing)}")
     for field in dataclasses.fields(method.inputs):
         seen, wanted = values.get(field.name), field.metadata.get("points")
-        if wanted and isinstance(seen, Observation) and seen.points_px.shape[-2] != wanted:
-            raise InputError(field.name, f"{seen.points_px.shape[-2]} points", f"give {wanted}")
+        if not wanted or not isinstance(seen, Observation):
+            continue
+        count, more = seen.points_px.shape[-2], field.metadata.get("more", False)
+        if count < wanted or (count > wanted and not more):
+            raise InputError(field.name, f"{count} points", f"give {wanted}" + (" or more" if more else ""))
     return method.inputs(**values)

@@ -18,6 +18,7 @@ from ..arrays import Array
 from ..camera import Camera
 from ..document import Document, Shape
 from ..errors import InputError, SubtenseError, UnknownCameraError
+from ..flat_view import whole_picture
 from ..hypothesis import ASSUMED_DISTORTION
 from ..method import Method
 from ..observation import Observation
@@ -103,6 +104,9 @@ def item_inputs(item: Item, photo: Photo | None, camera: Resolved | UnknownCamer
             values[field.name] = camera.camera
         elif camera is not None and field.default is dataclasses.MISSING:
             raise camera
+    for field in dataclasses.fields(item.method.inputs):
+        if field.metadata.get("of_photo") and photo is not None and values.get(field.name) is None:
+            values[field.name] = whole_picture(photo.width_px, photo.height_px)
     texts = _with_defaults(item.method, values, in_photo=photo is not None)
     inputs = read_inputs(item.method, texts)
     if photo is not None:
@@ -192,7 +196,8 @@ def _camera_of(inputs: Any) -> Camera | None:
 
 def _shapes(item: Item, inputs: Any) -> list[Shape]:
     """What to draw: each observation; the last is the one the label belongs to."""
-    fields = [f for f in dataclasses.fields(inputs) if isinstance(getattr(inputs, f.name), Observation)]
+    seen = [f for f in dataclasses.fields(inputs) if isinstance(getattr(inputs, f.name), Observation)]
+    fields = [f for f in seen if not f.metadata.get("of_photo")]
     shapes = []
     for field in fields:
         points = getattr(inputs, field.name).points_px.reshape(-1, 2)
