@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..detection import Detection, Search
-from ..detectors import faces, markers, objects, qr_codes, sheets
+from ..detectors import circles, faces, markers, objects, qr_codes, sheets
 from ..method import Method
 from ..methods import (
     calculator,
@@ -82,6 +82,8 @@ DETECTORS: dict[str, Detector] = {
                  ("body", "vehicle", "bottle", "household"), extra="networks"),
         Detector("sheets", "sheets, cards, plates and signs", sheets.sheets, sheets.GROUPS,
                  asks="which kind a sheet is, or its width and height"),
+        Detector("circles", "coins, balls and round signs", circles.circles, circles.GROUPS,
+                 asks="which coin or ball it is, or its diameter", automatic=False),
     )
 }
 """Ways to see things in a photo by themselves, by name."""
