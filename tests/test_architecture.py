@@ -21,6 +21,7 @@ HEAVY = {
     "matplotlib",
     "lensfunpy",
     "pycolmap",
+    "rasterio",
     "ai_edge_litert",
     "onnxruntime",
 }
