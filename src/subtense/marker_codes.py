@@ -26,6 +26,10 @@ WEAK = ("16h5", "4x4")
 """Families of 16 bits: every 16th dark square reads as one of their markers."""
 BORDER_SEEN = 0.85
 """Share of the border's cells that must read dark."""
+BORDER_GUESSED = 0.6
+"""The same before the blur is undone."""
+LEAST_CONTRAST = 12
+"""Of the ring around a marker over its border, encoded values of 255."""
 FINE_CELL_PX = 4.5
 """Cells narrower than this are read through the blur."""
 READING_BLUR_PX = 0.9
@@ -74,6 +78,28 @@ def cells_of(family: str, number: int) -> Array:
     return np.pad(codes(family)[number, 0].astype(float), 1)
 
 
+def rimmed(gray: Pixels, quads: list[Array]) -> list[Array]:
+    """Those of the quadrilaterals that are darker along their sides within than without, as every marker is."""
+    import cv2
+
+    if not quads:
+        return []
+    along = (np.arange(6) + 0.5) / 6
+    inset = np.array([0.06, -0.06])
+    a, b = (part.ravel() for part in np.meshgrid(along, inset))
+    square = np.concatenate([np.stack(pair, -1) for pair in ((a, b), (1 - b, a), (a, 1 - b), (b, a))])
+    maps = np.stack([_map(quad) for quad in quads])
+    places = np.concatenate([square, np.ones((len(square), 1))], axis=1) @ np.swapaxes(maps, 1, 2)
+    with np.errstate(all="ignore"):
+        x, y = (np.nan_to_num(places[..., i] / places[..., 2], nan=-1e4).astype(np.float32) for i in range(2))
+    seen = cv2.remap(gray, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
+    within = np.tile(b >= 0, 4)
+    dark, light = np.median(seen[:, within], axis=1), np.median(seen[:, ~within], axis=1)
+    darker = np.mean(seen[:, within] < ((dark + light) / 2)[:, None], axis=1)
+    kept = (light - dark >= LEAST_CONTRAST / 2) & (darker >= BORDER_GUESSED)
+    return [quad for quad, keep in zip(quads, kept, strict=True) if keep]
+
+
 class Reader:
     """Reads one quadrilateral; what was sampled for one family serves the others of its size.
 
@@ -84,14 +110,23 @@ class Reader:
 
     def __init__(self, gray: Pixels, corners_px: Array) -> None:
         self._gray, self._corners = gray, np.asarray(corners_px, float)
-        self._sampled: dict[int, Array | None] = {}
+        self._side_px = float(np.mean(np.hypot(*(np.roll(self._corners, -1, axis=0) - self._corners).T)))
+        self._sampled: dict[tuple[int, bool], Array | None] = {}
 
-    def read(self, family: str, correct: float = 0.0) -> Reading | None:
-        """What it is in a family, with at most this share of the correctable bits corrected."""
+    def read(self, family: str, correct: float = 0.0, *, fine: bool = False) -> Reading | None:
+        """What it is in a family.
+
+        Args:
+            family: of FAMILIES.
+            correct: share of the correctable bits that may be corrected.
+            fine: whether narrow cells are read through the blur.
+        """
         size = FAMILIES[family][1]
-        if size not in self._sampled:
-            self._sampled[size] = _bits(self._gray, self._corners, size)
-        seen = self._sampled[size]
+        if fine and self._side_px >= FINE_CELL_PX * size:
+            fine = False
+        if (size, fine) not in self._sampled:
+            self._sampled[size, fine] = _bits(self._gray, self._corners, size, fine=fine)
+        seen = self._sampled[size, fine]
         if seen is None:
             return None
         known = codes(family)
@@ -103,22 +138,24 @@ class Reader:
         return Reading(family, number, turns, least)
 
 
-def _bits(gray: Pixels, corners: Array, size: int) -> Array | None:
+def _bits(gray: Pixels, corners: Array, size: int, *, fine: bool) -> Array | None:
     """(bits, bits) True light; None where the border is not dark."""
-    side = float(np.mean(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T)))
-    tries = [_sampled] if side >= FINE_CELL_PX * size else [_sampled, _unblurred]
-    for values in (look(gray, corners, size) for look in tries):
+    values = _sampled(gray, corners, size)
+    border = np.ones((size, size), bool)
+    border[1:-1, 1:-1] = False
+    for again in (False, True):
         if values is None:
-            continue
-        border = np.ones((size, size), bool)
-        border[1:-1, 1:-1] = False
+            return None
         dark, light = float(np.median(values[1:-1, 1:-1][border])), float(np.median(_ring(values)))
-        if light - dark < 12:
-            continue
+        if light - dark < LEAST_CONTRAST:
+            return None
         bits = values[1:-1, 1:-1] > (dark + light) / 2
-        if np.mean(~bits[border]) >= BORDER_SEEN:
-            return np.asarray(bits[1:-1, 1:-1])
-    return None
+        if np.mean(~bits[border]) < (BORDER_SEEN if again or not fine else BORDER_GUESSED):
+            return None
+        if again or not fine:
+            break
+        values = _unblurred(gray, corners, size)
+    return np.asarray(bits[1:-1, 1:-1])
 
 
 def _ring(values: Array) -> Array:

@@ -15,7 +15,7 @@ Source: M. G. Kendall, Proof of relations connected with the tetrachoric series,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,9 +27,12 @@ PIXEL_BLUR = 0.28
 """A pixel's own width as a blur radius."""
 BENT_FROM_PX = 60.0
 """Patterns with longer sides may be bent by the lens."""
-MOST_PIXELS = 3000
+MOST_PIXELS = 2000
 MOST_STEPS = 25
-SETTLED_PX = 1e-3
+SETTLED_PX = 3e-3
+FEWER_PIXELS = 400
+ROUGHLY_PX = 0.1
+"""The first steps go with fewer pixels, until they are this short."""
 FLOOR_PX = 0.004
 """Standard deviation of a corner that is in any case there: uneven prints, resampled pictures, unlike blur."""
 LEAST_NOISE = 1e-3
@@ -90,8 +93,10 @@ def fit_pattern(gray: Array, corners_px: Array, cells: Array, curve: Quantity) -
     if begin is None:
         return None
     with np.errstate(all="ignore"):
-        found = _solve(patch, begin, curve)
-    return None if found is None else _fitted(patch, *found)
+        near = begin if len(patch.value) < 2 * FEWER_PIXELS else _solve(patch.fewer(), begin, curve, ROUGHLY_PX)
+        solved = None if near is None else _solve(patch, near, curve, SETTLED_PX)
+        found = None if solved is None else _settled(patch, solved, curve)
+    return None if found is None or solved is None else _fitted(patch, solved, *found)
 
 
 @dataclass(frozen=True)
@@ -138,6 +143,11 @@ class _Patch:
         picked = picked[_telling(a[picked], b[picked], n, unit)]
         value = np.asarray(gray[yy.ravel()[picked], xx.ravel()[picked]], float)
         return cls(xy[picked], value, 1.0 - np.asarray(cells, float), middle, unit, bool(sides.max() > BENT_FROM_PX))
+
+    def fewer(self) -> _Patch:
+        """A part of the pixels, for the first steps."""
+        step = len(self.value) // FEWER_PIXELS
+        return replace(self, xy=self.xy[::step], value=self.value[::step])
 
 
 def _telling(a: Array, b: Array, n: int, unit: float) -> Array:
@@ -210,8 +220,6 @@ def _correlated(patch: _Patch, rho: Array, z_a: Array, phi_a: Array, z_b: Array,
         now_a, before_a = z_a * now_a - (m - 1) * before_a, now_a
         now_b, before_b = z_b * now_b - (m - 1) * before_b, now_b
     return added
-
-
 
 
 def _model(patch: _Patch, x: Array) -> tuple[Array, Array]:
@@ -307,13 +315,9 @@ def _begin(patch: _Patch, corners_px: Array, curve: Quantity) -> Array | None:
     return np.concatenate([h, bends, [0.7, low, high, 0.0, 0.0, float(curve.value)]])
 
 
-def _solve(patch: _Patch, x: Array, curve: Quantity) -> tuple[Array, Array, float] | None:
-    """Levenberg-Marquardt with the curve's prior and weights against what hides the pattern.
-
-    Returns:
-        Parameters, their covariance, and the residuals' standard deviation; None where most of it is not as the pattern.
-    """
-    free = np.arange(len(x) - (1 if float(curve.u) < 1e-9 else 0))
+def _solve(patch: _Patch, x: Array, curve: Quantity, settled_px: float) -> Array | None:
+    """Levenberg-Marquardt with the curve's prior, and weights against what hides the pattern: the parameters."""
+    free = _free(x, curve)
     value, jac = _model(patch, x)
     residual, damping = patch.value - value, 1e-3
     for _ in range(MOST_STEPS):
@@ -330,18 +334,24 @@ def _solve(patch: _Patch, x: Array, curve: Quantity) -> tuple[Array, Array, floa
             return None
         if _cost(new, weight, x + step, curve) < _cost(residual, weight, x, curve):
             x, residual, jac, damping = x + step, new, new_jac, damping / 8
-            if np.max(abs(step[:8])) * patch.unit_px < SETTLED_PX:
+            if np.max(abs(step[:8])) * patch.unit_px < settled_px:
                 break
         else:
             damping *= 8
             if damping > 1e6:
                 break
-    return _settled(patch, x, jac, residual, free, curve)
+    return x
 
 
-def _settled(
-    patch: _Patch, x: Array, jac: Array, residual: Array, free: Array, curve: Quantity
-) -> tuple[Array, Array, float] | None:
+def _free(x: Array, curve: Quantity) -> Array:
+    """Which parameters are free: all, or all but a curve that was told."""
+    return np.arange(len(x) - (1 if float(curve.u) < 1e-9 else 0))
+
+
+def _settled(patch: _Patch, x: Array, curve: Quantity) -> tuple[Array, float] | None:
+    """Covariance of the parameters and standard deviation of the residuals; None where most is not as the pattern."""
+    free, (value, jac) = _free(x, curve), _model(patch, x)
+    residual = patch.value - value
     weight = _weight(residual, x)
     if np.mean(weight > 0.5) < LEAST_SEEN:
         return None
@@ -354,7 +364,7 @@ def _settled(
         cov[np.ix_(free, free)] = np.linalg.inv(normal)
     except np.linalg.LinAlgError:
         return None
-    return x, cov, sigma
+    return cov, sigma
 
 
 def _weight(residual: Array, x: Array) -> Array:
@@ -373,7 +383,9 @@ def _stray(patch: _Patch, x: Array, residual: Array, sigma: float) -> float:
     a, b, by_a, by_b = _along(patch, x)
     ratios = []
     for along, across, slope in ((a, b, by_a), (b, a, by_b)):
-        edge = np.clip(np.round(along * n), 0, n).astype(int) * (n + 2) + np.clip(np.floor(across * n) + 1, 0, n + 1).astype(int)
+        edge = np.clip(np.round(along * n), 0, n).astype(int) * (n + 2) + np.clip(
+            np.floor(across * n) + 1, 0, n + 1
+        ).astype(int)
         information = np.bincount(edge, slope**2, minlength=(n + 1) * (n + 2))
         pull = np.bincount(edge, slope * residual, minlength=(n + 1) * (n + 2))
         telling = information > 0.1 * information.max()

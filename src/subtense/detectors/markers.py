@@ -7,6 +7,7 @@ small by 0.2 to 2.7 %. The size of a marker is that of its black square, without
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from ..arrays import Array, Pixels
 from ..dark_quads import dark_quads
 from ..detection import Detection, Search
-from ..marker_codes import FAMILIES, WEAK, Reader, Reading, cells_of
+from ..marker_codes import FAMILIES, WEAK, Reader, Reading, cells_of, rimmed
 from ..observation import Observation
 from ..pattern import fit_pattern
 from ..photo import Photo
@@ -71,8 +72,8 @@ def _gray(pixels: Pixels) -> Pixels:
 
 def _levels(width_px: int, height_px: int, *, thorough: bool) -> list[float]:
     """Scales that are searched, in order."""
-    coarse = min(1.0, COARSE_PX / max(width_px, height_px))
-    scales = [coarse] if coarse > 0.7 else [coarse, 1.0]
+    coarse = 1 / max(math.ceil(max(width_px, height_px) / COARSE_PX), 1)
+    scales = [coarse] if coarse == 1 else [coarse, 1.0]
     return [*scales, 2.0] if thorough or width_px * height_px <= MOST_ENLARGED else scales
 
 
@@ -85,11 +86,11 @@ def _on_level(gray: Pixels, scale: float, search: Search) -> list[Observation]:
     else:
         how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
         level = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=how)
-    readers = [(quad, Reader(level, quad)) for quad in dark_quads(level, SMALLEST_QUAD_PX)]
-    for correct, families in _passes([search.family] if search.family else list(FAMILIES)):
+    readers = [(quad, Reader(level, quad)) for quad in rimmed(level, dark_quads(level, SMALLEST_QUAD_PX))]
+    for correct, fine, families in _passes([search.family] if search.family else list(FAMILIES)):
         found: list[Observation] = []
         for quad, reader in readers:
-            read = next((r for r in (reader.read(name, correct) for name in families) if r), None)
+            read = next((r for r in (reader.read(name, correct, fine=fine) for name in families) if r), None)
             one = read and _located(gray, _turned(_full(quad, scale), read), read, search.curve)
             if one and not _seen(one, found):
                 found.append(one)
@@ -98,10 +99,14 @@ def _on_level(gray: Pixels, scale: float, search: Search) -> list[Observation]:
     return []
 
 
-def _passes(families: list[str]) -> Iterator[tuple[float, list[str]]]:
-    """(share of bits corrected, families): exact readings first; the next only where the one before found nothing."""
+def _passes(families: list[str]) -> Iterator[tuple[float, bool, list[str]]]:
+    """(share of bits corrected, whether narrow cells are read through the blur, families).
+
+    The next only where the one before found nothing: exact readings first, and the families of 16 bits last.
+    """
     strong = [name for name in families if name not in WEAK]
-    yield from ((0.0, strong), (0.5, strong), (0.0, families), (0.5, families))
+    for names in (strong, families):
+        yield from ((correct, fine, names) for correct, fine in ((0.0, False), (0.0, True), (0.5, True)))
 
 
 def _full(quad: Array, scale: float) -> Array:
