@@ -117,8 +117,9 @@ class Rim:
     def observed(self, count: int) -> tuple[Array, Array]:
         """(count, 2) points evenly spaced on the ellipse, and their (2 count, 2 count) covariance of rank 5."""
         around = np.linspace(0, 2 * np.pi, count, endpoint=False)
-        by_vector = self.ellipse.points_by_vector(around).reshape(-1, 5)
-        return self.ellipse.points(around), by_vector @ self.cov @ by_vector.T
+        # across the rim only: a nearly round rim does not tell its angle, which would move points far along it
+        outwards = (self.ellipse.normals(around)[..., None] * _design(self.ellipse, around)[:, None, :]).reshape(-1, 5)
+        return self.ellipse.points(around), outwards @ self.cov @ outwards.T
 
 
 def fit_rim(gray: Array, rough: Ellipse, curve: Quantity) -> Rim | None:
