@@ -13,6 +13,8 @@ from .rounding import digits_for, fitting_unit, grouped
 INK, HALO, PLATE = (255, 221, 51), (20, 20, 20), (20, 20, 20, 190)
 SMOOTHED_PIXELS = 30_000_000
 """Larger pictures are drawn on directly."""
+MARKED_ENDS = 16
+"""Points of a shape that are marked one by one; of a contour the line is enough."""
 FORMATS = (".png", ".jpg", ".jpeg", ".webp")
 
 
@@ -54,8 +56,11 @@ def draw(document: Document, photo: Photo) -> Any:
     picture.paste(layer, mask=layer)
     pen = ImageDraw.Draw(picture, "RGBA")
     taken: list[tuple[float, float, float, float]] = []
+    captioned: set[str] = set()
     for shape in document.shapes:
-        _plate(pen, _caption(document, shape.label), shape, unit, picture.size, taken)
+        if shape.label not in captioned:  # an outline and the extent of it that was measured are of one label
+            _plate(pen, _caption(document, shape.label), shape, unit, picture.size, taken)
+        captioned.add(shape.label)
     return picture
 
 
@@ -66,7 +71,7 @@ def _outline(pen: Any, shape: Shape, unit: float, smooth: int) -> None:
     for colour, width in ((HALO, 5 * unit), (INK, 2.4 * unit)):
         pen.line(points, fill=colour, width=max(round(width), 1), joint="curve")
     r = 7 * unit
-    for x, y in ends:  # hollow, so that the end itself stays visible
+    for x, y in ends if len(ends) <= MARKED_ENDS else ():  # hollow, so that the end itself stays visible
         for colour, width in ((HALO, 4 * unit), (INK, 2 * unit)):
             pen.ellipse((x - r, y - r, x + r, y + r), outline=colour, width=max(round(width), 1))
 

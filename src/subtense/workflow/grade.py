@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+from ..arrays import Array
 from ..detection import Detection
 from ..observation import Observation
 from ..photo import Photo
@@ -30,3 +31,9 @@ def graded_line(photo: Photo, line: Observation) -> tuple[Observation, tuple[Not
 
 def _new(old: tuple[Note, ...], new: tuple[Note, ...]) -> tuple[Note, ...]:
     return tuple(note for note in new if note.code not in {one.code for one in old})
+
+
+def graded_contour(photo: Photo, ends: Observation, contour_px: Array) -> tuple[Observation, tuple[Note, ...]]:
+    """The ends of an outline's extent, judged by the picture's quality along its (N, 2) contour."""
+    found = quality(photo, Observation(contour_px, 0.5), closed=True)
+    return widened(ends, found), found.notes
