@@ -203,7 +203,7 @@ def _located(patch: Patch, point: Array, place: Array, arms: list[tuple[Array, A
     noise = sum((jac[i] @ sides[i].cov @ jac[i].T for i in (0, 1)), np.zeros((2, 2)))
     floor = np.diag([SIDE_SIGMA_PX**2, 0.0, 0.0])
     cov = noise + sum((jac[i] @ floor @ jac[i].T for i in (0, 1)), CORNER_SIGMA_PX**2 * np.eye(2))
-    shift = sum((jac[i] @ sides[i].by_curve for i in (0, 1)), np.zeros(2)) * patch.per_exponent * patch.u_exponent
+    shift = sum((jac[i] @ sides[i].by_curve for i in (0, 1)), np.zeros(2)) * patch.u_exponent
     if not np.all(np.isfinite(cov)) or np.sqrt(np.trace(cov)) > WORST_SIGMA_PX:
         return None
     return Corner(place, cov, shift, np.array([a for a, _ in arms]),

@@ -24,8 +24,7 @@ from .detection import unknown_curve
 from .errors import InputError, NothingFoundError
 from .observation import Observation
 from .quantity import Quantity
-from .subpixel import CORNER_SIGMA_PX, CURVE, SIDE_SIGMA_PX, WIDEST_STRIP_PX, Side, encoded_gray, fit_side
-from .transfer import light_of
+from .subpixel import CORNER_SIGMA_PX, SIDE_SIGMA_PX, WIDEST_STRIP_PX, Side, encoded_gray, fit_side
 
 if TYPE_CHECKING:
     from .photo import Photo
@@ -36,6 +35,9 @@ RADIUS_SHARE = 0.004
 STRIP_PX = 9.0
 """Width of the strip that a calliper averages, along the edge."""
 LONGER = 3.0
+"""A strip in which noise hides all edges is tried again with this many times its width."""
+ONE_STEP_PX = 4.0
+"""Two peaks of one sign that are nearer are of one blurred step."""
 TELLING_SHARE = 0.35
 """Of a step: a neighbour of less is noise, and leaves it its room."""
 LEAST_STEP = 0.04
@@ -59,20 +61,18 @@ def default_radius(photo: Photo) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A cut-out of a picture as encoded luminance with the exponent 2.2 of `subpixel`, whatever the picture's own is.
-
-    (`subpixel` takes light as a pure power of the encoded value, which sRGB is not: 0.05 px at a blur of 2 px.)
+    """A cut-out of a picture as encoded luminance.
 
     Attributes:
         gray: (h, w), 0 to 1.
         origin_px: (2,) x and y of its first pixel in the picture.
-        per_exponent: change of the exponent of `subpixel` with that of the picture.
-        u_exponent: standard deviation of the picture's exponent.
+        exponent: of the picture's transfer curve.
+        u_exponent: its standard deviation.
     """
 
     gray: Array
     origin_px: Array
-    per_exponent: float
+    exponent: float
     u_exponent: float
 
     @classmethod
@@ -81,9 +81,8 @@ class Patch:
         height, width = pixels.shape[:2]
         x0, y0 = np.clip(np.floor(low_px).astype(int), 0, [width - 1, height - 1])
         x1, y1 = np.clip(np.ceil(high_px).astype(int) + 1, [x0 + 1, y0 + 1], [width, height])
-        gray, exponent = encoded_gray(pixels[y0:y1, x0:x1]), float(curve.value)
-        gray = light_of(gray, exponent) ** (1 / CURVE)
-        return cls(gray, np.array([x0, y0], float), CURVE / exponent, float(curve.u))
+        gray = encoded_gray(pixels[y0:y1, x0:x1])
+        return cls(gray, np.array([x0, y0], float), float(curve.value), float(curve.u))
 
     def values(self, points_px: Array) -> Array:
         """(...) bilinear values at (..., 2) px of the picture; NaN outside."""
@@ -154,21 +153,29 @@ def edges_in(patch: Patch, point: Array, d: Array, radius_px: float, strip_px: f
     """As `edges_across`, in a patch that reaches far enough."""
     peaks = _peaks(patch, point, d, radius_px, strip_px)
     found: list[Edge] = []
+    unclear = 0.0
     for n, angle, step in peaks[:6]:
         gaps = [abs(n - other) for other, _, size in peaks if other != n and abs(size) > TELLING_SHARE * abs(step)]
         half = float(np.clip(0.6 * min(gaps, default=99.0), 1.6, WIDEST_STRIP_PX))
         edge = _located(patch, point, d, (n, angle, step), half, strip_px)
         if edge is None and half > 3.0:  # a rim, a line beside it: nearer to the edge it is a step
             edge = _located(patch, point, d, (n, angle, step), half / 2, strip_px)
-        if edge is None or edge.away_px > radius_px + 0.5:
+        if edge is None:
+            unclear = max(unclear, abs(step) * math.exp(-((n / radius_px) ** 2)))
             continue
+        if edge.away_px > radius_px + 0.5 or abs(step) * math.exp(-((n / radius_px) ** 2)) < RIVAL_SHARE * unclear:
+            continue  # beyond, or it stands behind a stronger step that is no clear edge and may be what is meant
         if not any(abs((edge.point_px - other.point_px) @ d) < 1.0 for other in found):
             found.append(edge)
     return tuple(sorted(found, key=lambda e: -e.contrast * math.exp(-((e.away_px / radius_px) ** 2))))
 
 
-def _peaks(patch: Patch, point: Array, d: Array, radius: float, strip: float) -> list[tuple[float, float, float]]:
-    """(place along d, angle, signed step) of the averaged strip's steps, strongest first."""
+Peak = tuple[float, float, float]
+"""Place along the direction, angle, and signed step of the averaged strip."""
+
+
+def _peaks(patch: Patch, point: Array, d: Array, radius: float, strip: float) -> list[Peak]:
+    """The averaged strip's steps, strongest and nearest first."""
     e = np.array([-d[1], d[0]])
     n = np.arange(-radius - 4.0, radius + 4.0 + _STEP_PX / 2, _STEP_PX)
     t = np.arange(-strip / 2 + 0.5, strip / 2)
@@ -190,12 +197,19 @@ def _peaks(patch: Patch, point: Array, d: Array, radius: float, strip: float) ->
            if size[i] >= LEAST_STEP / 2 and size[i] >= size[max(i - 3, 0) : i + 4].max()
            and abs(n[i]) <= radius + 1]  # fmt: skip
     found = [(float(n[i]), float(_ANGLES[best[i]]), float(along[i])) for i in top]
+    found = [peak for peak in found if not any(_of_one_step(peak, other, found) for other in found)]
     return sorted(found, key=lambda peak: -abs(peak[2]) * math.exp(-((peak[0] / radius) ** 2)))
 
 
-def _located(
-    patch: Patch, point: Array, d: Array, peak: tuple[float, float, float], half: float, strip: float
-) -> Edge | None:
+def _of_one_step(peak: Peak, other: Peak, every: list[Peak]) -> bool:
+    """Whether noise on a blurred step made the peak beside a larger one: same sign, near, and nothing opposite between."""
+    if abs(other[2]) <= abs(peak[2]) or other[2] * peak[2] < 0 or abs(other[0] - peak[0]) > ONE_STEP_PX:
+        return False
+    low, high = sorted((other[0], peak[0]))
+    return not any(low < n < high and step * peak[2] < 0 for n, _, step in every)
+
+
+def _located(patch: Patch, point: Array, d: Array, peak: Peak, half: float, strip: float) -> Edge | None:
     n, angle, step = peak
     e = np.array([-d[1], d[0]])
     middle, along = point + n * d, _unit(e + math.tan(angle) * d)
@@ -226,14 +240,14 @@ def piece(patch: Patch, middle: Array, along: Array, length: float, half: float,
     reach = (length / 2 + 1.5 * half) * along  # `fit_side` leaves out 1.5 half at either end
     place = middle - patch.origin_px
     dark = place - 50.0 * math.copysign(1.0, float(to_light @ _normal(along))) * _normal(along)
-    return fit_side(patch.gray, place - reach, place + reach, dark, half)
+    return fit_side(patch.gray, place - reach, place + reach, dark, half, patch.exponent)
 
 
 def _edge_of(patch: Patch, side: Side, place: Array, away: float) -> Edge:
     t = float((place - patch.origin_px - side.start) @ side.along)
     row = np.array([1.0, t, t * t])
     noise = math.sqrt(max(float(row @ side.cov @ row), 0.0))
-    shift = float(row @ side.by_curve) * patch.per_exponent * patch.u_exponent
+    shift = float(row @ side.by_curve) * patch.u_exponent
     across = _normal(side_tangent(side, t))
     across = across if across @ side.across > 0 else -across
     return Edge(place, across, math.hypot(noise, SIDE_SIGMA_PX), noise, shift, side.contrast, side.misfit, away)

@@ -294,6 +294,6 @@ def _covariance(patch: Patch, sides: list[Straight]) -> Array:
             moved[i, j] += 0.1 * sd[j]
             jac[:, j] = (corners(moved) - there) / (0.1 * sd[j])
         cov += jac @ own @ jac.T
-    size = patch.per_exponent * patch.u_exponent
+    size = patch.u_exponent
     shift = (corners(bends + 0.1 * np.stack([one.side.by_curve for one in sides])) - there) * 10 * size
     return np.asarray(cov + np.outer(shift, shift))

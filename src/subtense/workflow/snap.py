@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..arrays import Array
 from ..corners import Corner, corners_near
+from ..document import Document
 from ..edges import RIVAL_SHARE, Edge, checked, edges_across, end_covariance, line_of, no_edge, snap
 from ..errors import NothingFoundError
 from ..observation import Observation
@@ -16,6 +19,8 @@ from ..quantity import Note, Quantity
 
 ALONG = math.cos(math.radians(15.0))
 """A line within 15 degrees of a corner's edge runs along it, and ends in the corner."""
+CORNER_SHARE = 0.5
+"""Of the contrast of the edge across the line: with less along the line, it is a mark on the thing and no corner of it."""
 APART_PX = 2.0
 """Another edge that lies nearer to the chosen one is the same."""
 
@@ -57,6 +62,23 @@ def snapped(
     return found, (Note("snapped", text, "look at the overlay"), *notes)
 
 
+def snapped_lines(
+    photo: Photo, lines: Sequence[Observation], curve: Quantity
+) -> tuple[list[Observation], list[tuple[Note, ...]]]:
+    """Each line snapped, and the notes of each; see `snapped`."""
+    pairs = [snapped(photo, line, curve) for line in lines]
+    return [line for line, _ in pairs], [notes for _, notes in pairs]
+
+
+def with_line_notes(document: Document, notes: Sequence[tuple[Note, ...]]) -> Document:
+    """A document of lines, in their order, with further notes on the headline of each."""
+    rest, out = list(notes), []
+    for m in document.measurements:
+        head = m.what == "range" and rest
+        out.append(dataclasses.replace(m, notes=(*m.notes, *rest.pop(0))) if head else m)
+    return dataclasses.replace(document, measurements=tuple(out))
+
+
 def _corner(photo: Photo, point: Array, curve: Quantity, radius_px: float | None) -> tuple[Array, Array, Array]:
     place, radius = checked(photo, point, radius_px)
     corners = corners_near(photo, place, radius_px=radius, curve=curve)
@@ -75,7 +97,7 @@ def _line_ends(
     for number, end in enumerate(ends):
         corners = [c for c in corners_near(photo, end, radius_px=radius, curve=curve) if _runs_along(c, d)]
         edges = edges_across(photo, end, d, radius_px=radius, curve=curve)
-        if corners:
+        if corners and (not edges or corners[0].contrast > CORNER_SHARE * edges[0].contrast):
             found.append((corners[0].point_px, corners[0].cov, corners[0].by_curve_px))
             continue
         if not edges:
