@@ -209,7 +209,8 @@ def _detection(
     *, thick: bool = False,
 ) -> Detection:  # fmt: skip
     """The rim as points with covariance; of a coin, or what may be one, with the doubt of its thickness."""
-    shape = "sphere" if target is not None and target.group == "ball" else "circle"
+    ball = target is not None and target.group == "ball" and "disc" not in target.what  # a puck is in that group too
+    shape = "sphere" if ball else "circle"
     if thick or (target is not None and target.group == "coin"):
         rim = Rim(rim.ellipse, rim.cov + _by_thickness(rim.ellipse), rim.share, rim.scatter_px, rim.contrast, rim.one_sign,
                   rim.blur_px, rim.widest_gap_rad)  # fmt: skip
