@@ -2,33 +2,50 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 from .. import assumptions
+from ..detection import unknown_curve
 from ..document import Document
 from ..errors import InputError
 from ..observation import Observation
 from ..photo import Photo
-from ..quantity import Quantity
-from .measure import joined, measure_lines, measure_markers
+from ..quantity import Note, Quantity
+from .found import Asked, Progress, measured
+from .measure import joined, measure_lines
+from .snap import snapped_lines, with_line_notes
 
 
 def measure_document(
     photo: Photo, *, lines: Sequence[str] = (), sizes: Sequence[str] = (), tilt: str | None = None,
-    marker_size: str | None = None, marker_family: str | None = None, camera: str | None = None, level: float = 0.95,
-    seed: int = 0,
+    marker_size: str | None = None, asked: Asked | None = None, camera: str | None = None, level: float = 0.95,
+    seed: int = 0, snap: bool = False, progress: Progress | None = None,
 ) -> Document:  # fmt: skip
-    """Lines of known size, or markers, or both, as one document.
+    """Lines of known size, or what is found by itself, or both, as one document.
+
+    Args:
+        photo: the picture.
+        lines: two ends each; without any, everything that can be found is looked for.
+        sizes: of the lines, one for all or one each; without lines one, of things whose size nothing else tells.
+        tilt: of the lines.
+        marker_size: side of markers; with it alone, only markers are looked for.
+        asked: what to look for.
+        camera: what the user said of it; None to go by the photo.
+        level: coverage of the intervals.
+        seed: of the draws.
+        snap: move the ends of lines to the edges and corners near them.
+        progress: is told what is looked for, and the share of all work done.
 
     Raises:
-        InputError: nothing to measure, or a text that can't be read.
+        NothingFoundError: nothing found, or nothing to snap to.
+        InputError: a text that can't be read.
     """
-    if not lines and marker_size is None:
-        raise InputError("--line or --marker-size", None, "give --line X1,Y1,X2,Y2 with --size, or --marker-size")
+    asked = what_to_look_for(asked or Asked(), marker_size, lines)
     if lines and not sizes:
         raise InputError("--size", None, "give the real size of what the line spans, as --size '210 mm'")
-    if sizes and not lines:
-        raise InputError("--line", None, "give the two ends of what has this size, as --line 120,80,640,80")
+    if len(sizes) > 1 and not lines:
+        raise InputError("--line", None, "give the two ends of each thing that has a size, as --line 120,80,640,80")
     found = []
     if lines:
         ends = [Observation.parse(text, name="--line", count=2) for text in lines]
@@ -36,11 +53,26 @@ def measure_document(
         angle = (
             None if tilt is None else Quantity.parse(tilt, "rad", bare="deg", name="--tilt", assume=assumptions.angle)
         )
-        found.append(measure_lines(photo, ends, lengths, camera=camera, tilt=angle, level=level, seed=seed))
-    if marker_size is not None:
-        side = read_length(marker_size, "--marker-size")
-        found.append(measure_markers(photo, side, family=marker_family, camera=camera, level=level, seed=seed))
+        notes: list[tuple[Note, ...]] = []
+        if snap:
+            ends, notes = snapped_lines(photo, ends, unknown_curve())
+        document = measure_lines(photo, ends, lengths, camera=camera, tilt=angle, level=level, seed=seed)
+        found.append(with_line_notes(document, notes))
+    if asked is not None:
+        side = None if marker_size is None else read_length(marker_size, "--marker-size")
+        size = read_length(sizes[0], "--size") if sizes and not lines else None
+        found.append(measured(photo, asked, size=size, marker_size=side, camera=camera, level=level, seed=seed,
+                              progress=progress))  # fmt: skip
     return joined(found)
+
+
+def what_to_look_for(asked: Asked, marker_size: str | None, lines: Sequence[str]) -> Asked | None:
+    """What is left to find by itself: nothing beside lines alone, markers where only their size was given, else everything."""
+    if asked.only or asked.targets:
+        return asked
+    if marker_size is not None:
+        return dataclasses.replace(asked, only=("markers",))
+    return None if lines else asked
 
 
 def read_length(text: str, name: str) -> Quantity:
@@ -49,3 +81,9 @@ def read_length(text: str, name: str) -> Quantity:
     if not float(length.value) > 0:
         raise InputError(name, text, "give a length above 0")
     return length
+
+
+def gray_will_do(asked: Asked, marker_size: str | None, lines: Sequence[str]) -> bool:
+    """Whether only markers are looked for, which have no colour."""
+    left = what_to_look_for(asked, marker_size, lines)
+    return not lines and left is not None and left.only == ("markers",)
