@@ -33,6 +33,8 @@ FINE = 1e-4
 """A last step above which there is no cone."""
 REFITS = 2
 """Steps of a moved rim from the nominal cone."""
+LEAST_SIZE = 1e-9
+"""Points nearer together are one."""
 STEPS, ROUNDS = 40, 2
 """Steps of the nominal fit at most, and how often it is weighted."""
 SMALL_SHARE = 1e-2
@@ -274,27 +276,33 @@ def _begin(rays: Array, round_one: bool) -> tuple[Array, Array, Array]:
     frame = frame_of(np.nan_to_num(rays.mean(axis=-2), nan=1.0))
     seen = np.nan_to_num(_placed(rays @ np.swapaxes(frame, -1, -2), np.eye(3)))
     middle = seen.mean(axis=-2, keepdims=True)
-    scale = np.sqrt(np.mean((seen - middle) ** 2, axis=(-1, -2)))[..., None, None] + 1e-300
-    x, y = np.moveaxis((seen - middle) / scale, -1, 0)
-    one = np.ones_like(x)
-    kasa = np.linalg.pinv(np.stack([x, y, one], -1)) @ (x * x + y * y)[..., None]
-    cx, cy, c = kasa[..., 0, 0] / 2, kasa[..., 1, 0] / 2, kasa[..., 2, 0]
-    zero = np.zeros_like(cx)
-    circle = np.stack(
-        [np.stack([zero + 1, zero, -cx], -1), np.stack([zero, zero + 1, -cy], -1), np.stack([-cx, -cy, -c], -1)], -2
-    )
-    conic = circle
+    scale = np.sqrt(np.mean((seen - middle) ** 2, axis=(-1, -2))) + LEAST_SIZE
+    x, y = np.moveaxis((seen - middle) / scale[..., None, None], -1, 0)
+    conic = _circle_by(x, y)
     if not round_one:
-        design = np.stack([x * x, 2 * x * y, y * y, 2 * x, 2 * y, one], -1)
-        a, b, cc, d, e, f = np.moveaxis(np.linalg.svd(design, full_matrices=True)[2][..., -1, :], -1, 0)
-        general = np.stack([np.stack([a, b, d], -1), np.stack([b, cc, e], -1), np.stack([d, e, f], -1)], -2)
-        conic = np.where(_is_ellipse(general)[..., None, None], general, circle)
-    # back from centred and scaled places: v' = (v - middle) / scale
-    move = np.zeros((*scale.shape[:-2], 3, 3))
-    move[..., 0, 0] = move[..., 1, 1] = 1 / scale[..., 0, 0]
-    move[..., :2, 2] = -(middle / scale)[..., 0, :]
+        general = _conic_by(x, y)
+        conic = np.where(_is_ellipse(general)[..., None, None], general, conic)
+    move = np.zeros((*scale.shape, 3, 3))  # to centred and scaled places
+    move[..., 0, 0] = move[..., 1, 1] = 1 / scale
+    move[..., :2, 2] = -middle[..., 0, :] / scale[..., None]
     move[..., 2, 2] = 1
     return _principal(np.swapaxes(move, -1, -2) @ conic @ move, frame, round_one)
+
+
+def _circle_by(x: Array, y: Array) -> Array:
+    """(..., 3, 3) the circle of least algebraic distance (Kasa) as a conic."""
+    found = np.linalg.pinv(np.stack([x, y, np.ones_like(x)], -1)) @ (x * x + y * y)[..., None]
+    cx, cy, c = found[..., 0, 0] / 2, found[..., 1, 0] / 2, found[..., 2, 0]
+    zero = np.zeros_like(cx)
+    rows = ([zero + 1, zero, -cx], [zero, zero + 1, -cy], [-cx, -cy, -c])
+    return np.stack([np.stack(row, -1) for row in rows], -2)
+
+
+def _conic_by(x: Array, y: Array) -> Array:
+    """(..., 3, 3) the conic of least algebraic distance."""
+    design = np.stack([x * x, 2 * x * y, y * y, 2 * x, 2 * y, np.ones_like(x)], -1)
+    a, b, c, d, e, f = np.moveaxis(np.linalg.svd(design, full_matrices=True)[2][..., -1, :], -1, 0)
+    return np.stack([np.stack(row, -1) for row in ([a, b, d], [b, c, e], [d, e, f])], -2)
 
 
 def _is_ellipse(conic: Array) -> Bools:

@@ -26,6 +26,8 @@ SECTOR_PX = 5.0
 FEWEST, MOST = 20, 96
 COMMON_SIGMA_PX = 0.01
 """How far a whole rim may lie off, whatever the residuals say."""
+LEAST_SEEN = 0.4
+"""Share of the sectors that must show an edge."""
 PASSES = 4
 CURVE_STEP = 0.2
 """Of the exponent, for the change of the rim with it."""
@@ -140,6 +142,8 @@ def fit_rim(gray: Array, rough: Ellipse, curve: Quantity) -> Rim | None:
         if sectors is None:
             return None
         found = _located(sectors, exponent, blur)
+        if found.seen.mean() < LEAST_SEEN:
+            return None
         fit = _adjusted(ellipse, sectors.around, found)
         if fit is None:
             return None
