@@ -127,6 +127,10 @@ class Standing:
         _check_points("horizon", self.horizon, range(1, 10_001), "one point with a known roll, or two or more")
         _check_points("parallels", self.parallels, (4, 8), "4 points of two parallel lines, or 8 of two pairs")
         _check_points("reference", self.reference, (2,), "2 points on the ground")
+        for name in ("horizon", "reference"):
+            seen = getattr(self, name)
+            if seen is not None and seen.points_px.shape[-2] > 1 and not np.any(np.ptp(seen.points_px, axis=-2)):
+                raise InputError(name, "one point several times", "give points that lie apart")
         for name in ("height", "reference_length"):
             length = getattr(self, name)
             if length is not None and np.ndim(length.value) == 0 and not float(length.value) > 0:
@@ -193,7 +197,8 @@ def stand(inputs: Standing) -> Stand:
     height: Array = np.ones(())
     for _ in range(SETTLED_PASSES):
         found = Stand(_level(inputs, height), height)
-        height = height * length / meet(inputs, found, rays, np.zeros(())).apart_m()
+        with np.errstate(divide="ignore", invalid="ignore"):
+            height = height * length / meet(inputs, found, rays, np.zeros(())).apart_m()
     return Stand(_level(inputs, height), height)
 
 

@@ -177,6 +177,8 @@ def _closed_form(camera: Camera, seen: Observation, points_m: Array, factor: flo
             pose = Pose(rotation_from_vector(np.reshape(turn, 3)), np.reshape(shift, 3))
             if np.all(np.isfinite(pose.rotation)) and np.all(np.isfinite(pose.translation_m)):
                 poses.append(pose)
+        if poses:
+            break
     return poses
 
 
@@ -220,15 +222,18 @@ class _Problem:
         return _State(state.vector + step[6:], Pose(rotation, state.pose.translation_m + step[3:6]))
 
     def linear(self, state: _State, whiten: Array) -> tuple[Array, Array]:
-        """Residual and its Jacobian, by central differences."""
+        """Residual and its Jacobian by central differences, all of them projected at once."""
         scale = np.concatenate([np.full(3, 1e-6), np.full(3, 1e-5), 1e-4 / np.maximum(np.diag(self.prior), 1e-12)])
-        columns = []
-        for i, size in enumerate(scale):
-            step = np.zeros(len(scale))
-            step[i] = size
-            up, down = (self.residual(self.stepped(state, sign * step), whiten) for sign in (1, -1))
-            columns.append((up - down) / (2 * size))
-        return self.residual(state, whiten), np.stack(columns, -1)
+        steps = np.concatenate([np.diag(scale), -np.diag(scale), np.zeros((1, len(scale)))])
+        pose = Pose(rotation_from_vector(steps[:, :3]) @ state.pose.rotation, state.pose.translation_m + steps[:, 3:6])
+        vectors = state.vector[:, None] + steps[:, 6:].T
+        pixels = (self.camera_at(vectors).project(pose.apply(self.points_m)) - self.seen.points_px).reshape(
+            len(steps), -1
+        )
+        known = _vector(self.known)[list(self.free)]
+        whole = np.concatenate([pixels @ whiten.T, (vectors - known[:, None]).T @ self.prior.T], -1)
+        count = len(scale)
+        return whole[-1], np.asarray(((whole[:count] - whole[count:-1]) / (2 * scale[:, None])).T)
 
     def settled(self, state: _State, whiten: Array, most: int) -> _State:
         """Levenberg and Marquardt's steps to the least squares."""

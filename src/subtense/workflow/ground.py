@@ -28,6 +28,9 @@ U_TAKEOFF_M = 3.0
 STEEPEST_RAD = math.radians(60.0)
 RESOLVED = 3.0
 """A length of less of its u is not resolved."""
+NOT_BELOW_0 = {(ground_plane.METHOD.name, "ground_distance"), (ground_length.METHOD.name, "length"),
+               (ground_speed.METHOD.name, "speed"), (ground_speed.METHOD.name, "length")}  # fmt: skip
+"""What is a distance between two points, whose draws all lie above it where it is small."""
 GROUND, START = "the ground", "the take-off"
 _DATUMS = {"ground": GROUND, "the ground": GROUND, "takeoff": START, "take-off": START, "start": START, "the take-off": START,
            "the start": START}  # fmt: skip
@@ -324,10 +327,10 @@ def _instant(text: str, whole: str) -> tuple[datetime, float]:
 
 
 def _resolved(m: Measurement) -> Measurement:
-    """A length or a speed of less than three of its u, whose interval reaches down to 0: nothing shows that it is not."""
-    kind = (m.method, m.what) in ((ground_length.METHOD.name, "length"), (ground_speed.METHOD.name, "speed"))
-    if not kind or m.u is None or m.value >= RESOLVED * m.u:
+    """A length, a speed or a distance of less than three of its u, whose interval reaches down to 0: nothing shows that it is not."""
+    if (m.method, m.what) not in NOT_BELOW_0 or m.u is None or m.value >= RESOLVED * m.u:
         return m
-    text = f"the two points are less than {RESOLVED:g} u apart: whether they are apart at all is not shown"
-    note = Note("length_not_resolved", text, "mark them more closely, or come nearer")
+    far = "the point and the camera's foot" if m.what == "ground_distance" else "the two points"
+    text = f"{far} are less than {RESOLVED:g} u apart: whether they are apart at all is not shown"
+    note = Note("length_not_resolved", text, "mark the points more closely, or come nearer")
     return dataclasses.replace(m, low=0.0, notes=(*m.notes, note))
