@@ -1,8 +1,8 @@
 import { describe, expect, it, vi } from "vitest";
-import { Latest, type MethodRow } from "../src/lib/api";
+import { Latest, type Detection, type MethodRow } from "../src/lib/api";
 import { Undo } from "../src/lib/undo";
 import { Calculator, fromFragment, toFragment } from "../src/calculator/state.svelte";
-import { constrained, inputsOf, inside, moved, nextLabel, pointFields, readProject, readSheet, turned, typedFields, wanting, type Shape } from "../src/measure/session";
+import { constrained, inputsOf, inside, moved, nextLabel, notesOf, pointFields, readProject, readSheet, sameFound, shapeOf, snappedTo, turned, typedFields, unsnapped, wanting, type Shape } from "../src/measure/session";
 import { toPicture, toScreen } from "../src/measure/viewer";
 
 vi.mock("openseadragon", () => ({ default: { console: {} } }));
@@ -28,10 +28,17 @@ const method = {
 
 describe("a method's row", () => {
   it("tells which fields take points and which are typed", () => {
-    expect(pointFields(method)).toEqual([{ name: "ends", count: 2, closed: false }]);
+    expect(pointFields(method)).toEqual([{ name: "ends", count: 2, least: 2, closed: false }]);
     expect(typedFields(method).map((field) => field.name)).toEqual(["size"]);
     expect(wanting(shape, method)).toEqual([]);
     expect(wanting({ ...shape, texts: { size: " " } }, method)).toEqual(["size"]);
+    for (const half of ["rectangle  x 297 mm", "rectangle 210 ± 1 mm x "]) expect(wanting({ ...shape, texts: { size: half } }, method)).toEqual(["size"]);
+    expect(wanting({ ...shape, texts: { size: "rectangle 210 mm x 297 mm" } }, method)).toEqual([]);
+  });
+  it("may take any number of points, and ask for some that can be left out", () => {
+    const rim = { description: "", "x-noun": "Observation", "x-widget": "points", "x-closed": true } as const;
+    const disc = { ...method, inputs: { required: ["rim"], properties: { rim, horizon: rim } } };
+    expect(pointFields(disc)).toEqual([{ name: "rim", count: Infinity, least: 5, closed: true }]);
   });
 });
 
@@ -48,6 +55,40 @@ describe("a shape", () => {
     const found = { ...shape, seen: { ends: seen } };
     expect(inputsOf(found).ends).toBe(seen);
     expect(inputsOf(moved(found, "ends", 0, [9, 9])).ends).toMatchObject({ points_px: [[9, 9], [3, 4]] });
+  });
+  it("that was found is measured by what the detector says, whose doubts go along", () => {
+    const assumed = { code: "assumed_size", text: "taken to be a cup", cure: "" };
+    const turnedHead = { code: "head_turned", text: "turned", cure: "" };
+    const cup: Detection = {
+      points_px: [[1, 2], [3, 40]], sigma_px: 1, cov: null, label: "cup", score: 1, source: "boxes", detector: "objects", shape: "length", target: "cup",
+      others: ["glass"], tilt: { value: 0 }, notes: [assumed, turnedHead], method: "known_size", points_field: "ends", size_field: "size", size_prefix: "",
+      size_text: "93 ± 14 mm (1s)",
+    };
+    const found = { ...shapeOf(cup, ""), id: "2", label: "cup" };
+    expect(inputsOf(found)).toEqual({ ends: { points_px: cup.points_px, sigma_px: 1, cov: null, label: "cup", score: 1, source: "boxes" }, size: "93 ± 14 mm (1s)", tilt: { value: 0 } });
+    expect(notesOf(found)).toEqual([assumed, turnedHead]);
+    expect(notesOf({ ...found, texts: { size: "95 mm" } })).toEqual([turnedHead]); // a person said it
+    expect(shapeOf({ ...cup, size_text: null, size_prefix: "square " }, " 50 mm ").texts).toEqual({ size: "square 50 mm" });
+    expect(shapeOf({ ...cup, size_text: null }, " ").texts).toEqual({});
+    const dragged = moved(found, "ends", 0, [1, 2.1]);
+    expect(dragged.seen).toBeUndefined();
+    expect(notesOf(dragged)).toEqual([assumed, turnedHead]);
+    expect(sameFound(found, dragged)).toBe(true);
+    expect(sameFound(found, moved(found, "ends", 0, [9, 9]))).toBe(false);
+    expect(sameFound(shape, found)).toBe(false);
+    const stored = readSheet(JSON.parse(JSON.stringify({ ...sheet, shapes: [found] })))!;
+    expect(stored.shapes[0]).toEqual(found);
+    const bad = readSheet({ ...sheet, shapes: [{ ...found, found: { ...found.found, notes: "none" } }] })!;
+    expect(bad.shapes[0]!.found).toBeUndefined();
+  });
+  it("goes to the edges near it and back", () => {
+    const seen = { points_px: [[1.2, 2.2], [3, 4]], sigma_px: 1, cov: null, label: "", score: 1, source: "edges" } as never;
+    const note = { code: "snapped", text: "moved", cure: "" };
+    const there = snappedTo(shape, "ends", seen, [note]);
+    expect(inputsOf(there).ends).toBe(seen);
+    expect(notesOf(there)).toEqual([note]);
+    expect(unsnapped(there)).toEqual(shape);
+    expect(notesOf(moved(there, "ends", 0, [5, 5]))).toEqual([]);
   });
   it("is never changed in place", () => {
     const before = JSON.stringify(shape);

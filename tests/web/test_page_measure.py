@@ -37,7 +37,10 @@ def at(page: Page, label: str, index: int = 0) -> tuple[float, float]:
 
 def draw(page: Page, tool: str, *points: tuple[float, float], drag: bool = False) -> None:
     """Use a tool at places of the stage."""
-    page.get_by_role("button", name=tool, exact=True).click()
+    button = page.get_by_role("button", name=tool, exact=True)
+    if not button.is_visible():
+        page.locator("summary").filter(has_text="More").click()
+    button.click()
     box = page.get_by_test_id("stage").bounding_box()
     for i, (x, y) in enumerate(points):
         page.mouse.move(box["x"] + x, box["y"] + y)
@@ -233,9 +236,9 @@ def test_the_server_may_be_stopped_and_started_again(browser, examples, tmp_path
 
 def test_markers_are_found(visit, examples):
     page = opened(visit, examples / "desk.jpg")
-    page.get_by_role("button", name="Find markers").click()
+    page.get_by_role("button", name="Find…").click()
     page.get_by_label("side of the markers' black square").fill("50 ± 0.2 mm")
-    page.get_by_role("button", name="Find", exact=True).click()
+    page.get_by_role("button", name="Find ArUco and AprilTag markers").click()
     expect(page.get_by_test_id("details")).to_contain_text("36h11 id 7", timeout=20_000)
     photo = Photo.load(examples / "desk.jpg")
     m = measure_document(photo, marker_size="50 ± 0.2 mm").measurements[0]
@@ -245,9 +248,10 @@ def test_markers_are_found(visit, examples):
 def test_a_search_can_be_cancelled(visit, server, tmp_path):
     (tmp_path / "big.jpg").write_bytes(picture(6000, 4000, "JPEG"))
     page = opened(visit, tmp_path / "big.jpg")
-    page.get_by_role("button", name="Find markers").click()
-    page.get_by_role("button", name="Find", exact=True).click()
+    page.keyboard.press("f")
+    page.get_by_role("button", name="Find ArUco and AprilTag markers").click()
     expect(page.get_by_role("progressbar")).to_be_visible()
+    expect(page.get_by_role("status").filter(has_text="Looking for ArUco and AprilTag markers")).to_be_visible()
     page.get_by_role("button", name="Cancel").click()
     expect(page.get_by_role("status").filter(has_text="ended")).to_be_visible()
     assert until(lambda: not server.children())

@@ -68,6 +68,7 @@ export interface FieldSchema {
   "x-widget": string;
   "x-unit"?: string;
   "x-points"?: number;
+  "x-least"?: number;
   "x-closed"?: boolean;
   "x-typed"?: boolean;
 }
@@ -85,10 +86,10 @@ export interface MethodRow {
 export interface DetectorRow {
   name: string;
   title: string;
-  method: string;
-  field: string;
-  target: string;
+  groups: string[];
   asks: string;
+  automatic: boolean;
+  extra: string;
 }
 export interface ReportRow {
   name: string;
@@ -125,6 +126,7 @@ export interface Target {
   height: string | null;
   text: string;
   aliases: string[];
+  doubt: string;
   source: string;
 }
 export interface Seen {
@@ -135,11 +137,26 @@ export interface Seen {
   score: number;
   source: string;
 }
+/** One thing found, and how it is measured: its points go into one field of a method, its size into another. */
+export interface Detection extends Seen {
+  detector: string;
+  shape: string;
+  target: string | null;
+  others: string[];
+  tilt: Record<string, unknown> | null;
+  notes: Note[];
+  method: string;
+  points_field: string;
+  size_field: string;
+  size_prefix: string;
+  size_text: string | null;
+}
 export interface Job {
   id: string;
   state: "running" | "done" | "failed" | "cancelled";
   progress: number;
-  result: { observations: Seen[] } | null;
+  doing: string;
+  result: { detections: Detection[]; notes: Note[] } | null;
   error: { message: string } | null;
 }
 export interface Curve {

@@ -1,8 +1,8 @@
 /** The measuring page's state: session with undo, photos on the server, answers; what is drawn and pressed is in the components. */
-import { ApiError, get, Latest, post, send, type CameraSaid, type Doc, type GivenCamera, type MethodRow, type Note, type Photo, type Tables, type Target } from "../lib/api";
+import { ApiError, get, Latest, post, send, type CameraSaid, type Detection, type Doc, type GivenCamera, type MethodRow, type Note, type Photo, type Seen, type Tables, type Target } from "../lib/api";
 import { store } from "../lib/store";
 import { Undo } from "../lib/undo";
-import { EMPTY, inputsOf, nextLabel, PROJECT, readProject, readSheet, sigmaOf, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
+import { EMPTY, inputsOf, nextLabel, notesOf, PROJECT, readProject, readSheet, sameFound, shapeOf, sigmaOf, snappedTo, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
 
 export type Answer = { state: "done"; doc: Doc } | { state: "wants"; fields: string[] } | { state: "refused"; message: string; field: string | null } | { state: "waits" };
 
@@ -27,6 +27,11 @@ export class Model {
   reachable = $state(true);
   busy: string[] = $state([]);
   ready = $state(false);
+  /** Whether points that are set go to the edges near them, and what the last such move said. */
+  snaps = $state(false);
+  said = $state("");
+  /** The sizes of things whose size must be told, by detector. */
+  sizes: Record<string, string> = $state({});
 
   private answered: Record<string, { shape: Shape; camera: GivenCamera } | null> = $state.raw({});
   private current = new Map<string, { shape: Shape; camera: GivenCamera }>();
@@ -46,6 +51,9 @@ export class Model {
   }
   get shape(): Shape | undefined {
     return this.sheet?.shapes.find((shape) => shape.id === this.selected);
+  }
+  target(name: string | null): Target | undefined {
+    return this.targets.find((row) => row.name === name);
   }
   method(name: string): MethodRow | undefined {
     return this.tables?.methods.find((row) => row.name === name);
@@ -175,16 +183,58 @@ export class Model {
     const index = this.session.sheets.findIndex((one) => one.photo.id === photo);
     const sheet = this.session.sheets[index];
     if (!sheet) return [];
-    const made: Shape[] = [];
-    shapes.forEach((shape, i) => {
-      const wished = labels[i];
-      const taken = [...sheet.shapes, ...made].some((other) => other.label === wished);
-      made.push({ ...shape, id: crypto.getRandomValues(new Uint32Array(2)).join("-"), label: wished && !taken ? wished : nextLabel([...sheet.shapes, ...made]) });
-    });
+    const made = named(shapes, labels, sheet.shapes);
     this.commit(withSheet(this.session, index, (old) => ({ ...old, shapes: [...old.shapes, ...made] })));
     if (index === this.session.current) this.selected = made[0]?.id ?? null;
     for (const shape of made) this.measure(shape, this.session.sheets[index]!);
     return made;
+  }
+
+  /** What a search found becomes measurements, in one step of undo; what is there already only learns its size. */
+  take(found: readonly Detection[], photo: string): { made: number; known: number; unsized: number } {
+    const index = this.session.sheets.findIndex((one) => one.photo.id === photo);
+    const sheet = this.session.sheets[index];
+    if (!sheet) return { made: 0, known: 0, unsized: 0 };
+    const all = found.map((one) => ({ label: one.label, shape: shapeOf(one, this.sizes[one.detector] ?? "") }));
+    const fresh = all.filter(({ shape }) => !sheet.shapes.some((old) => sameFound(old, shape)));
+    const old = sheet.shapes.map((shape) => {
+      const again = all.find((one) => sameFound(shape, one.shape))?.shape;
+      const field = shape.found?.field ?? "";
+      // what a person typed stays; a size that was assumed or left open is what is known of it now
+      const free = again?.texts[field] && (!shape.texts[field]?.trim() || shape.texts[field] === shape.found?.text);
+      return free ? { ...shape, texts: { ...shape.texts, [field]: again.texts[field]! }, found: again.found! } : shape;
+    });
+    const made = named(fresh.map((one) => one.shape), fresh.map((one) => one.label), old);
+    this.commit(withSheet(this.session, index, (before) => ({ ...before, shapes: [...old, ...made] })));
+    if (index === this.session.current) this.selected = made.length === 1 ? made[0]!.id : null;
+    this.measureSheet(this.session.sheets[index]!);
+    return { made: made.length, known: all.length - made.length, unsized: made.filter((shape) => !shape.texts[shape.found!.field]).length };
+  }
+
+  /** Move the points of a shape to the edges near them, where there are some; a step of undo of its own. */
+  async snap(id: string): Promise<void> {
+    const sheet = this.sheet;
+    const shape = sheet?.shapes.find((one) => one.id === id);
+    if (!sheet || !shape) return;
+    const several = Object.keys(shape.points).length > 1;
+    const sigma = sigmaOf(shape);
+    this.said = "";
+    let now = shape;
+    for (const [field, points] of Object.entries(shape.points)) {
+      if (shape.seen?.[field] || (points.length !== 2 && points.length !== 4)) continue;
+      try {
+        const body = { photo: sheet.photo.id, points_px: points, ...(typeof sigma === "number" ? { sigma_px: sigma } : {}) };
+        const { observation, notes } = await this.withPhoto(sheet.photo.id, () => post<{ observation: Seen; notes: Note[] }>("/api/snap", body));
+        now = snappedTo(now, field, { ...observation, label: several ? field : "" }, notes);
+      } catch (error) {
+        if (this.unreachable(error)) return;
+        this.said = `Left where it was set: ${error instanceof Error ? error.message : String(error)}`;
+      }
+    }
+    const newest = this.sheet?.shapes.find((one) => one.id === id);
+    if (now === shape || newest?.points !== shape.points) return; // it was moved on meanwhile
+    const { points, seen, snapped } = now;
+    this.changeShape(id, (old) => ({ ...old, points, ...(seen ? { seen } : {}), ...(snapped ? { snapped } : {}) }));
   }
 
   remove(id: string): void {
@@ -353,7 +403,7 @@ export class Model {
       asking = new Latest<Asked, Doc>(
         ({ shape, sheet }) =>
           this.withPhoto(sheet.photo.id, () =>
-            post<Doc>(`/api/measure/${shape.method}`, { photo: sheet.photo.id, camera: sheet.camera, label: shape.label, inputs: inputsOf(shape) }),
+            post<Doc>(`/api/measure/${shape.method}`, { photo: sheet.photo.id, camera: sheet.camera, label: shape.label, inputs: inputsOf(shape), notes: notesOf(shape) }),
           ),
         (doc, { shape, sheet }) => this.isNewest(shape, sheet) && this.tell(shape.id, { state: "done", doc }, shape, sheet),
         (error, { shape, sheet }) => {
@@ -391,7 +441,7 @@ export class Model {
         const row = this.method(shape.method);
         return row && !wanting(shape, row).length;
       })
-      .map((shape) => ({ method: shape.method, label: shape.label, inputs: inputsOf(shape) }));
+      .map((shape) => ({ method: shape.method, label: shape.label, inputs: inputsOf(shape), notes: notesOf(shape) }));
     return { photo: sheet.photo.id, camera: sheet.camera, items };
   }
 
@@ -426,6 +476,17 @@ export class Model {
     }
     this.selected = null;
   }
+}
+
+/** Measurements with ids and labels of their own: that which is wished, or the next free letter. */
+function named(shapes: readonly Omit<Shape, "id" | "label">[], labels: readonly (string | undefined)[], there: readonly Shape[]): Shape[] {
+  const made: Shape[] = [];
+  shapes.forEach((shape, i) => {
+    const wished = labels[i];
+    const taken = [...there, ...made].some((other) => other.label === wished);
+    made.push({ ...shape, id: crypto.getRandomValues(new Uint32Array(2)).join("-"), label: wished && !taken ? wished : nextLabel([...there, ...made]) });
+  });
+  return made;
 }
 
 /** Stored sheets that can be read, each photo once. */

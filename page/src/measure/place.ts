@@ -17,6 +17,10 @@ export function place(points: readonly (readonly [number, number])[], width: num
     [cx - width / 2, top - gap - height],
     [right + gap, cy - height / 2],
     [left - gap - width, cy - height / 2],
+    [right + gap / 2, bottom + gap / 2],
+    [left - gap / 2 - width, bottom + gap / 2],
+    [right + gap / 2, top - gap / 2 - height],
+    [left - gap / 2 - width, top - gap / 2 - height],
   ] as const;
   const cost = ([x, y]: readonly [number, number]) => {
     const outside = Math.max(-x, 0) + Math.max(-y, 0) + Math.max(x + width - stage.width, 0) + Math.max(y + height - stage.height, 0);

@@ -1,5 +1,5 @@
 /** What a person measures: photos, their cameras, the shapes drawn on them. Plain data, never changed in place. */
-import type { GivenCamera, MethodRow, Photo, Seen } from "../lib/api";
+import type { Detection, GivenCamera, MethodRow, Note, Photo, Seen } from "../lib/api";
 
 export type Point = readonly [x: number, y: number];
 
@@ -13,8 +13,30 @@ export interface Shape {
   texts: Readonly<Record<string, string>>;
   /** Standard deviation of a clicked end, px; empty for the default. */
   sigma: string;
-  /** What a detector saw, by field; gone once its points are moved by hand. */
+  /** What a detector or an edge says of the points, by field; gone once they are moved by hand. */
   seen?: Readonly<Record<string, Seen>>;
+  /** What a detector says of the thing, which holds wherever its points are. */
+  found?: Found;
+  /** Where points stood that were moved to the edges near them, by field, and what is doubtful about it. */
+  snapped?: Readonly<Record<string, Snapped>>;
+}
+
+export interface Found {
+  detector: string;
+  /** The field of its size, and what stands there before a size that is told. */
+  field: string;
+  prefix: string;
+  /** What its size is taken to be, as the field takes it; null where it must be told. */
+  text: string | null;
+  target: string | null;
+  others: readonly string[];
+  tilt: Readonly<Record<string, unknown>> | null;
+  notes: readonly Note[];
+}
+
+export interface Snapped {
+  marked: readonly Point[];
+  notes: readonly Note[];
 }
 
 export interface Sheet {
@@ -31,11 +53,24 @@ export interface Session {
 export const EMPTY: Session = { sheets: [], current: 0 };
 export const CLICK_SIGMA = 0.7;
 
-/** Fields of a method that take points, in order, with how many each. */
-export function pointFields(method: MethodRow): { name: string; count: number; closed: boolean }[] {
+const LEAST_OF_MANY = 5;
+
+export interface PointField {
+  name: string;
+  /** How many points it takes; Infinity where that is free, from `least` on. */
+  count: number;
+  least: number;
+  closed: boolean;
+}
+
+/** Fields of a method that take points and can not do without, in order. */
+export function pointFields(method: MethodRow): PointField[] {
   return Object.entries(method.inputs.properties)
-    .filter(([, field]) => field["x-noun"] === "Observation" && field["x-points"])
-    .map(([name, field]) => ({ name, count: field["x-points"]!, closed: field["x-closed"] ?? false }));
+    .filter(([name, field]) => field["x-noun"] === "Observation" && method.inputs.required.includes(name))
+    .map(([name, field]) => {
+      const count = field["x-points"] ?? Infinity;
+      return { name, count, least: field["x-points"] ?? field["x-least"] ?? LEAST_OF_MANY, closed: field["x-closed"] ?? false };
+    });
 }
 
 /** Fields of a method that a person types: those with a default doubt, and targets. */
@@ -51,9 +86,10 @@ export function typedFields(method: MethodRow): { name: string; noun: string; un
     }));
 }
 
-/** Whether a method measures by points in a picture, so that there is a tool for it. */
+/** Whether a method measures by points in a picture that can be set, so that there is a tool for it. */
 export function isTool(method: MethodRow): boolean {
-  return pointFields(method).length > 0;
+  const fields = pointFields(method);
+  return fields.length > 0 && fields.every((field) => field.count < Infinity || field.closed);
 }
 
 /** The stated standard deviation of an end, px; undefined where nothing was said, null where it can't be read. */
@@ -78,14 +114,51 @@ export function inputsOf(shape: Shape): Record<string, unknown> {
       source: stated ? "clicked, as stated" : `assumed: a clicked end is known to ${CLICK_SIGMA} px`,
     };
   }
+  if (shape.found?.tilt) inputs.tilt = shape.found.tilt;
   for (const [name, text] of Object.entries(shape.texts)) if (text.trim()) inputs[name] = text.trim();
   return inputs;
 }
 
-/** Required fields that nothing was typed into yet. */
+/** Doubts about what was seen, for `notes` of a request; a size that a person has said is no longer assumed. */
+export function notesOf(shape: Shape): Note[] {
+  const found = shape.found;
+  const assumed = found && found.text !== null && shape.texts[found.field] === found.text;
+  const seen = (found?.notes ?? []).filter((note) => note.code !== "assumed_size" || assumed);
+  return [...seen, ...Object.values(shape.snapped ?? {}).flatMap((one) => one.notes)];
+}
+
+/** What was found as a measurement without a name; `told` is the size of things whose size must be told. */
+export function shapeOf(one: Detection, told: string): Omit<Shape, "id" | "label"> {
+  const { points_px, sigma_px, cov, label, score, source } = one;
+  const text = one.size_text ?? (told.trim() ? one.size_prefix + told.trim() : "");
+  return {
+    method: one.method,
+    points: { [one.points_field]: points_px },
+    texts: text ? { [one.size_field]: text } : {},
+    sigma: "",
+    seen: { [one.points_field]: { points_px, sigma_px, cov, label, score, source } },
+    found: { detector: one.detector, field: one.size_field, prefix: one.size_prefix, text: one.size_text, target: one.target, others: one.others, tilt: one.tilt, notes: one.notes },
+  };
+}
+
+/** Whether two measurements are of the same thing found: by the same detector, at the same place. */
+export function sameFound(a: Pick<Shape, "method" | "points" | "found">, b: Pick<Shape, "method" | "points" | "found">): boolean {
+  if (!a.found || a.found.detector !== b.found?.detector || a.method !== b.method) return false;
+  return Object.entries(a.points).every(([field, points]) => {
+    const others = b.points[field] ?? [];
+    const extent = Math.max(...points.map((p) => Math.hypot(p[0] - points[0]![0], p[1] - points[0]![1])));
+    return others.length === points.length && points.every((p, i) => Math.hypot(p[0] - others[i]![0], p[1] - others[i]![1]) < Math.max(2, 0.03 * extent));
+  });
+}
+
+/** A rectangle of which one side is still to be said. */
+const ONE_SIDE = /^rectangle\s+(x\s.*|.*\sx)\s*$/;
+
+/** Required fields that nothing, or only half of it, was typed into yet. */
 export function wanting(shape: Shape, method: MethodRow): string[] {
+  const open = (text: string) => !text.trim() || ONE_SIDE.test(text);
   return typedFields(method)
-    .filter((field) => field.required && !shape.texts[field.name]?.trim())
+    .filter((field) => field.required && open(shape.texts[field.name] ?? ""))
     .map((field) => field.name);
 }
 
@@ -108,19 +181,43 @@ export function withShape(sheet: Sheet, id: string, change: (shape: Shape) => Sh
   return { ...sheet, shapes: sheet.shapes.map((shape) => (shape.id === id ? change(shape) : shape)) };
 }
 
-/** The shape with one point moved; what a detector said of the field is gone. */
+/** A record without one of its fields; undefined where nothing is left. */
+function without<T>(of: Readonly<Record<string, T>> | undefined, field: string): { [name: string]: T } | undefined {
+  const left = Object.entries(of ?? {}).filter(([name]) => name !== field);
+  return left.length ? Object.fromEntries(left) : undefined;
+}
+
+function withPoints(shape: Shape, field: string, points: readonly Point[]): Shape {
+  const { seen: oldSeen, snapped: oldSnapped, ...rest } = shape;
+  const [seen, snapped] = [without(oldSeen, field), without(oldSnapped, field)];
+  return { ...rest, points: { ...shape.points, [field]: points }, ...(seen ? { seen } : {}), ...(snapped ? { snapped } : {}) };
+}
+
+/** The shape with one point moved; what a detector or an edge said of the field's points is gone. */
 export function moved(shape: Shape, field: string, index: number, to: Point): Shape {
-  const points = { ...shape.points, [field]: (shape.points[field] ?? []).map((point, i) => (i === index ? to : point)) };
-  const { seen, ...rest } = shape;
-  const left = Object.fromEntries(Object.entries(seen ?? {}).filter(([name]) => name !== field));
-  return { ...rest, points, ...(Object.keys(left).length ? { seen: left } : {}) };
+  return withPoints(
+    shape,
+    field,
+    (shape.points[field] ?? []).map((point, i) => (i === index ? to : point)),
+  );
 }
 
 /** A closed shape with its corners counted from the next one, so that width and height change places. */
 export function turned(shape: Shape, field: string): Shape {
   const points = shape.points[field] ?? [];
-  const { seen: _seen, ...rest } = shape;
-  return { ...rest, points: { ...shape.points, [field]: [...points.slice(1), ...points.slice(0, 1)] } };
+  return withPoints(shape, field, [...points.slice(1), ...points.slice(0, 1)]);
+}
+
+/** The shape with a field's points at the edges near them. */
+export function snappedTo(shape: Shape, field: string, seen: Seen, notes: readonly Note[]): Shape {
+  const marked = shape.points[field] ?? [];
+  const moved = withPoints(shape, field, seen.points_px);
+  return { ...moved, seen: { ...moved.seen, [field]: seen }, snapped: { ...moved.snapped, [field]: { marked, notes } } };
+}
+
+/** The shape with the points where they were marked. */
+export function unsnapped(shape: Shape): Shape {
+  return Object.entries(shape.snapped ?? {}).reduce((before, [field, { marked }]) => withPoints(before, field, marked), shape);
 }
 
 /** A point inside the picture, to a hundredth of a pixel. */
@@ -206,5 +303,24 @@ function readShape(value: unknown): Shape | null {
   const texts = Object.entries(shape.texts ?? {});
   if (!texts.every(([, text]) => isText(text))) return null;
   const seen = shape.seen && typeof shape.seen === "object" ? { seen: shape.seen } : {};
-  return { id: shape.id, label: shape.label, method: shape.method, points: shape.points, texts: shape.texts ?? {}, sigma: String(shape.sigma ?? ""), ...seen };
+  const found = isFound(shape.found) ? { found: shape.found } : {};
+  const snapped = isSnapped(shape.snapped) ? { snapped: shape.snapped! } : {};
+  return { id: shape.id, label: shape.label, method: shape.method, points: shape.points, texts: shape.texts ?? {}, sigma: String(shape.sigma ?? ""), ...seen, ...found, ...snapped };
+}
+
+function isNotes(value: unknown): value is Note[] {
+  return Array.isArray(value) && value.length <= 20 && value.every((note: Partial<Note> | null) => note && isText(note.code, 50) && isText(note.text) && isText(note.cure));
+}
+
+function isFound(value: unknown): value is Found {
+  const found = value as Partial<Found> | null;
+  if (!found || typeof found !== "object" || !isText(found.detector) || !isText(found.field) || !isText(found.prefix)) return false;
+  const named = (text: unknown) => text === null || isText(text);
+  const tilt = found.tilt === null || (typeof found.tilt === "object" && !Array.isArray(found.tilt));
+  return named(found.text) && named(found.target) && tilt && Array.isArray(found.others) && found.others.every((name) => isText(name)) && isNotes(found.notes);
+}
+
+function isSnapped(value: unknown): value is Record<string, Snapped> {
+  if (!value || typeof value !== "object") return false;
+  return Object.values(value).every((one: Partial<Snapped> | null) => one && Array.isArray(one.marked) && one.marked.every(isPoint) && isNotes(one.notes));
 }
