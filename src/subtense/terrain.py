@@ -10,6 +10,8 @@ Source: OGC GeoTIFF 1.1 (cells, georeference, vertical systems).
 from __future__ import annotations
 
 import math
+import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -132,25 +134,23 @@ def load_terrain(path: Path, around_m: tuple[float, float], sigma_m: float, datu
         InputError: no vertical datum, or another than the file's.
         MissingExtraError: rasterio is not installed.
     """
-    try:
-        import rasterio
-        from rasterio.errors import RasterioError
-    except ImportError:
-        raise MissingExtraError("a terrain model", "terrain") from None
     path = Path(path)
     if not path.is_file():
         raise FileFormatError(path, "no such file")
-    import warnings
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a file without georeference, and of what rasterio itself imports
+        try:
+            import rasterio
+            from rasterio.errors import RasterioError
+        except ImportError:
+            raise MissingExtraError("a terrain model", "terrain") from None
+        try:
             with rasterio.open(path, driver="GTiff") as opened:
                 return _read(opened, path, around_m, sigma_m, datum)
-    except (RasterioError, OSError, ValueError, MemoryError) as error:
-        if isinstance(error, FileFormatError | InputError):
+        except (FileFormatError, InputError):
             raise
-        raise FileFormatError(path, "is no GeoTIFF that can be read") from None
+        except (RasterioError, OSError, ValueError, MemoryError):
+            raise FileFormatError(path, "is no GeoTIFF that can be read") from None
 
 
 def _read(opened: Any, path: Path, around_m: tuple[float, float], sigma_m: float, datum: str | None) -> Terrain:
@@ -164,7 +164,7 @@ def _read(opened: Any, path: Path, around_m: tuple[float, float], sigma_m: float
         raise FileFormatError(path, f"has coordinates in {opened.crs.linear_units if opened.crs.is_projected else 'degrees'}; "
                               "reproject it to a system in metres (UTM, say) with gdalwarp -t_srs")  # fmt: skip
     named = _datum(opened.crs.to_wkt(), datum)
-    column, row = ~shift * around_m
+    column, row = _cell(shift, *around_m)
     half = WITHIN_M / math.sqrt(abs(shift.a * shift.e - shift.b * shift.d))
     left, right = (int(np.clip(column + sign * half, 0, opened.width)) for sign in (-1, 1))
     top, bottom = (int(np.clip(row + sign * half, 0, opened.height)) for sign in (-1, 1))
@@ -181,14 +181,19 @@ def _read(opened: Any, path: Path, around_m: tuple[float, float], sigma_m: float
     band = opened.read(1, window=Window(left, top, right - left, bottom - top), masked=True)
     heights = np.asarray(band.astype(float).filled(np.nan), float)
     heights[(abs(heights) > 12_000) | ~np.isfinite(heights)] = np.nan  # no height on earth
-    x, y = shift * (left + 0.5, top + 0.5)
+    x, y = (p * (left + 0.5) + q * (top + 0.5) + r for p, q, r in (shift[:3], shift[3:6]))
     return Terrain(heights, (shift.a, shift.b, x, shift.d, shift.e, y), sigma_m, named, path.name)
+
+
+def _cell(shift: Any, x_m: float, y_m: float) -> tuple[float, float]:
+    """Column and row of a place, by the file's affine transform of cell corners."""
+    a, b, c, d, e, f = shift[:6]
+    det = a * e - b * d
+    return (e * (x_m - c) - b * (y_m - f)) / det, (a * (y_m - f) - d * (x_m - c)) / det
 
 
 def _datum(wkt: str, stated: str | None) -> str:
     """The vertical datum: the file's, else the stated one."""
-    import re
-
     found = re.search(r'VERT_CS\["([^"]+)"|VERTCRS\["([^"]+)"', wkt)
     named = next((part for part in found.groups() if part), None) if found else None
     if named is None and not stated:
@@ -209,7 +214,5 @@ def same_datum(one: str, other: str) -> bool:
 
 
 def _plain(name: str) -> str:
-    import re
-
     words = re.sub(r"\([^)]*\)|\bheights?\b|\bdepth\b", " ", name.lower())
     return re.sub(r"[^a-z0-9]", "", words)

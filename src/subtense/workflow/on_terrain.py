@@ -213,7 +213,7 @@ def _uneven(terrain: Terrain, camera: _Camera, trial: ground_plane.Inputs, settl
     place = stand(settled)
     for sign in (-2.0, 2.0):
         met = terrain.meet(camera.place_m, _way(trial, camera, sign * tilt), float(trial.refraction.value))
-        turned = rotation_from_vector(-sign * tilt * place.level.right)
+        turned = rotation_from_vector(sign * tilt * place.level.right)
         ray = settled.camera.rays(settled.foot.points_px) @ turned.T
         flat = float(meet(settled, place, ray, np.asarray(settled.point_height.value)[..., None]).range_m[0])
         if not abs(met - flat) <= DIFFERS * u:
