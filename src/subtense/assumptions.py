@@ -87,6 +87,12 @@ LISTED: tuple[tuple[str, str], ...] = (
      "`calc` leaves it out and takes its full size as a one-sided limit"),
     ("lens distortion of a camera known from metadata only", f"k1 = 0 with u = {UNKNOWN_K1}; phone 0.02, industrial 0.1, action 0.25"),
     ("principal point of such a camera", "the middle of the picture, 1 % of its width (1s)"),
+    ("slope of the ground", "0, 1 % (1s) each way"),
+    ("roll of a camera above the ground", "0, 1.5° (1s), where neither file nor person tells it"),
+    ("ground seen by a drone", "as high as its take-off, 3 m (1s)"),
+    ("refraction of light along the ground", "k = 0.13, as much for its u"),
+    ("what was marked as the horizon", "between a vanishing line and the visible horizon, as limits"),
+    ("readout of a rolling shutter", "up to 60 ms either way, as limits"),
     ("counts of pixels", "exact"),
 )  # fmt: skip
 """Every default, as the documentation prints it."""
