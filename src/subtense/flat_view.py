@@ -7,7 +7,6 @@ d is the share in the corner. Its value is 0, and its doubt goes through everyth
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,17 +126,20 @@ def flat_view(
     """
     n = points.points_px.size
     seen = straight_view(camera, points.points_px, distortion, disc)
-    floor = FLOOR_PX / (1.0 if camera is None else float(camera.f_px))
-    cov = floor**2 * np.eye(n) + covariance_by(
-        (camera, points, distortion), lambda c, p, d: straight_view(c, p.points_px, d, disc), n
-    )
+    scale = np.ones(2) if camera is None else float(camera.f_px) * np.array([1.0, float(camera.aspect)])
+    floor = np.diag(np.tile((FLOOR_PX / scale) ** 2, n // 2))
+    cov = floor + covariance_by((points,), lambda p: straight_view(camera, p.points_px, distortion, disc), n)
     flat = target.points_m[..., :2]
     first = fit(flat, seen, cov)
-    if target.sigma_m and np.all(np.isfinite(first.h)):
-        whole = np.linalg.inv(first.seen.matrix) @ first.h @ first.plane.matrix
-        own: Callable[..., Array] = lambda t: transfer(whole, t.points_m[..., :2])[0]  # noqa: E731
-        cov = cov + covariance_by((target,), own, n)
-        first = fit(flat, seen, cov)
+    if not np.all(np.isfinite(first.h)):
+        return FlatView(first, disc)
+    whole = np.linalg.inv(first.seen.matrix) @ first.h @ first.plane.matrix
+    # the camera's doubt moves points in proportion to where they are: of where they were clicked it would bias the fit
+    smooth = points.points_px + (transfer(whole, flat)[0] - seen) * scale
+    cov = cov + covariance_by((camera, distortion), lambda c, d: straight_view(c, smooth, d, disc), n)
+    if target.sigma_m:
+        cov = cov + covariance_by((target,), lambda t: transfer(whole, t.points_m[..., :2])[0], n)
+    first = fit(flat, seen, cov)
     if camera is None or not place or not np.all(np.isfinite(first.h)):
         return FlatView(first, disc)
     return _placed(first, disc, target.points_m, seen, cov)

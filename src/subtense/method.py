@@ -30,6 +30,7 @@ class Reason(enum.IntEnum):
     NO_VANISHING_POINT = 11
     NO_HEIGHT = 12
     AT_OR_ABOVE_HORIZON = 13
+    UPSIDE_DOWN = 14
 
     @property
     def text(self) -> str:
@@ -57,6 +58,7 @@ _REASONS: dict[Reason, tuple[str, bool]] = {
     Reason.NO_VANISHING_POINT: ("the lines do not determine a vanishing point or the horizon: they coincide, or are too short", False),
     Reason.NO_HEIGHT: ("the reference has no height in this view: its two ends fall on one point, or the view is straight down", True),
     Reason.AT_OR_ABOVE_HORIZON: ("a point lies at or above the horizon of the ground: its pitch, its slope or the point is wrong, or it is no ground", True),
+    Reason.UPSIDE_DOWN: ("base and top are exchanged: the first point is the base on the plane, the second the top", False),
 }
 
 Partials = tuple[Array, ...]
