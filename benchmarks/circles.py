@@ -55,7 +55,7 @@ def measured(found, shape):
     return propagate.measure(dataclasses.replace(method.METHOD, outputs=one), inputs, draws=20_000)[0]
 
 
-def rendered(scenes: int = 40) -> list[Row]:
+def rendered(scenes: int = 24) -> list[Row]:
     """By shape and size: how many are found, mean error of the range and its scatter, normalised errors, coverage."""
     table = [("what", "diameter", "found", "mean error of the range", "scatter", "rms of error / u", "in 95 %")]
     for shape, size, tilts, blurs in CASES:
@@ -126,7 +126,7 @@ def noise_alone(pictures: int = 40) -> int:
 
 if __name__ == "__main__":
     print("found in noise:", noise_alone())
-    for row in rendered(int(sys.argv[1]) if len(sys.argv) > 1 else 40):
+    for row in rendered(int(sys.argv[1]) if len(sys.argv) > 1 else 24):
         print("| " + " | ".join(row) + " |")
     if DATA.is_dir():
         for row in rows():

@@ -29,6 +29,8 @@ COMMON_SIGMA_PX = 0.01
 LEAST_SEEN = 0.4
 """Share of the sectors that must show an edge."""
 PASSES = 4
+POOLED = 20
+"""Pixels of its own that count as much as all other sectors in what is taken for a sector's noise."""
 CURVE_STEP = 0.2
 """Of the exponent, for the change of the rim with it."""
 MOST_PIXELS = 80
@@ -257,7 +259,10 @@ def _located(sectors: _Sectors, exponent: float, blur: float | None) -> _Located
     base = _model(x, sectors, exponent)
     off = np.where(used, value - base, 0.0)
     have = used.sum(1)
-    noise = np.sqrt((off**2).sum(1) / np.maximum(have - len(free), 1))
+    spare = np.maximum(have - len(free), 1)
+    alone = (off**2).sum(1) / spare
+    # few pixels tell their noise badly, and weights by it would be worse than none: partly that of all sectors
+    noise = np.sqrt((spare * alone + POOLED * np.median(alone)) / (spare + POOLED))
     inverse = np.linalg.pinv(normal + 1e-9 * scale * np.eye(len(free)))
     u = noise * np.sqrt(np.maximum(inverse[:, 0, 0], 0.0))
     contrast = encoded_of(x[:, 3], exponent) - encoded_of(x[:, 2], exponent)
@@ -328,18 +333,8 @@ def _judged(gray: Array, ellipse: Ellipse, half: float, curve: Quantity, blur: f
     good, design = robust > 0.2, _design(ellipse, sectors.around)
     if good.sum() < 8:
         return None
-    weight = good / (found.u**2 + 0.01**2)
-    normal = (design * weight[:, None]).T @ design
-    normal += 1e-9 * np.trace(normal) * np.eye(5)
-    gain = np.linalg.solve(normal, design.T * weight)
-    off = found.offset - design @ (gain @ found.offset)
-    chi2 = float(weight @ off**2) / max(int(good.sum()) - 5, 1)
-    cov = np.asarray(np.linalg.inv(normal), float) * max(chi2, 1.0) * _together(off, good)
+    off, cov = _covariance(sectors, found, good, design, curve, blur)
     cov += COMMON_SIGMA_PX**2 * np.diag([1.0, 1, 1, 1, 1 / ellipse.a_px**2])
-    if curve.u:
-        other = _located(sectors, exponent + CURVE_STEP, blur)
-        moved = gain @ np.where(good & other.seen, (other.offset - found.offset) / CURVE_STEP, 0.0)
-        cov += float(curve.u) ** 2 * np.outer(moved, moved)
     signs = found.contrast[good]
     one_sign = float(max((signs > 0).mean(), (signs < 0).mean()))
     turned = np.sort(sectors.around[good])
@@ -347,6 +342,34 @@ def _judged(gray: Array, ellipse: Ellipse, half: float, curve: Quantity, blur: f
     scatter = float(np.sqrt(np.mean(off[good] ** 2)))
     return Rim(final, _ordered(cov, ellipse, final), float(good.mean()), scatter, float(np.median(signs)), one_sign,
                float(blur or 1.0), gap)  # fmt: skip
+
+
+def _covariance(
+    sectors: _Sectors, found: _Located, good: Bools, design: Array, curve: Quantity, blur: float | None
+) -> tuple[Array, Array]:
+    """Residuals of the sectors, and the (5, 5) covariance: noise, the common blur, and the transfer curve."""
+    weight = good / (found.u**2 + 0.01**2)
+    normal = (design * weight[:, None]).T @ design
+    normal += 1e-9 * np.trace(normal) * np.eye(5)
+    gain = np.linalg.solve(normal, design.T * weight)
+    off = np.asarray(found.offset - design @ (gain @ found.offset))
+    chi2 = float(weight @ off**2) / max(int(good.sum()) - 5, 1)
+    cov = np.asarray(np.linalg.inv(normal), float) * max(chi2, 1.0) * _together(off, good)
+    exponent = float(curve.value)
+
+    def by(step: float, exponent: float, blur: float | None) -> Array:
+        other = _located(sectors, exponent, blur)
+        return np.asarray(gain @ np.where(good & other.seen, (other.offset - found.offset) / step, 0.0))
+
+    if blur is not None:  # it is the median of the sectors' own
+        free = _located(sectors, exponent, None)
+        u_blur = 1.25 * 1.4826 * float(np.median(abs(free.blur[good] - blur))) / float(good.sum()) ** 0.5
+        moved = by(0.05 * blur, exponent, 1.05 * blur)
+        cov += u_blur**2 * np.outer(moved, moved)
+    if curve.u:
+        moved = by(CURVE_STEP, exponent + CURVE_STEP, blur)
+        cov += float(curve.u) ** 2 * np.outer(moved, moved)
+    return off, cov
 
 
 def _ordered(cov: Array, before: Ellipse, after: Ellipse) -> Array:
