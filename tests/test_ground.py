@@ -377,6 +377,24 @@ def test_times():
         document(moves=["800,700;900,700"])
 
 
+ZEBRA = "87,982;331,842;1605,969;1379,834;87,982;1605,969;331,842;1379,834"
+
+
+def test_a_zebra_crossing_gives_height_and_horizon(examples):
+    """Its stripes are 3 m long, and their edges level lines in two directions; the person stands 8.05 m away."""
+    said = GroundTexts(parallels=ZEBRA, reference="640,980;714,840", reference_length="3 ± 0.02 m", slope="0 exact")
+    photo = Photo.load(examples / "street.jpg")
+    m = ground_document(photo, ["672,897"], said=said, camera="f=1829 ± 10px").measurements[0]
+    assert m.low < 8.05 < m.high and m.u / m.value < 0.02
+
+
+def test_a_horizon_that_leans_is_doubted():
+    said = GroundTexts(height="1.6 ± 0.02 m", horizon="1,200;1500,500")
+    assert "horizon_leans" in {n.code for n in document("400,1100", said=said).measurements[0].notes}
+    level = GroundTexts(height="1.6 ± 0.02 m", horizon="1,500;1500,510")
+    assert "horizon_leans" not in {n.code for n in document("400,1100", said=level).measurements[0].notes}
+
+
 # -- what the height counts from ---------------------------------------------------------------------------
 
 

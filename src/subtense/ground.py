@@ -34,6 +34,8 @@ REFRACTION, U_REFRACTION = 0.13, 0.13
 """Coefficient of refraction; by day, metres above the ground. Close to hot ground it may be far from it, even negative."""
 CURVED_BEYOND_M = 500.0
 """Distance beyond which the note `earth_curvature` tells what the earth's curvature does."""
+LEANING_RAD = math.radians(8.0)
+"""Roll of a marked horizon, or of level lines, beyond which they are doubted: pictures are held straighter."""
 NEAR_HORIZON = 3.0
 """Of u of the angle below the horizon: a point nearer to the horizon is noted."""
 SETTLED_PASSES = 3
@@ -250,7 +252,7 @@ def _reasons(rays: Array, falls: Array, height: Array, inner: Array, t: Array) -
 
 
 def ground_notes(inputs: Standing, seen: Observation, above_m: Array) -> tuple[Note, ...]:
-    """`slope_assumed`, `roll_assumed`, `near_horizon`, `horizon_assumed` and `earth_curvature`, for points (N) of a nominal scene."""
+    """Doubts of what was assumed, of a horizon that leans or is near, and `earth_curvature`, for points (N) of a nominal scene."""
     place = stand(inputs)
     met = meet(inputs, place, inputs.camera.rays(seen.points_px), above_m)
     found = []
@@ -268,6 +270,10 @@ def ground_notes(inputs: Standing, seen: Observation, above_m: Array) -> tuple[N
         text = ("the line marked is taken for the horizon of level ground, and hills are higher; whether it is a vanishing line or the "
                 f"visible horizon, {math.degrees(dip):.2g}° lower, is in u")  # fmt: skip
         found.append(Note("horizon_assumed", text, "state dip: 0 for a vanishing line, 1 for the visible horizon"))
+    lean = abs(float(place.level.roll_rad))
+    if inputs.pitch is None and lean > LEANING_RAD:
+        text = f"by the points marked the camera leans by {math.degrees(lean):.0f}° to a side; few pictures do"
+        found.append(Note("horizon_leans", text, "check the points, and which lines are parallel and level"))
     return (*found, *_near_horizon(inputs, met), *_curvature(inputs, met))
 
 

@@ -217,7 +217,7 @@ def _height(said: GroundTexts, told: ToldPose | None) -> tuple[str, dict[str, An
         if said.reference_length is None:
             raise InputError("--reference-length", None, "give how far apart the two points of --reference are")
         length = _length(said.reference_length, "--reference-length", above_0=True)
-        return GROUND, {"reference": Observation.parse(said.reference, name="--reference", count=2), "reference_length": length,
+        return GROUND, {"reference": _marked(said.reference, "reference", 2), "reference_length": length,
                         "rise": rise}, ()  # fmt: skip
     if said.height is not None:
         text, word, name = re.sub(r"\s+", " ", said.height.strip()).partition(" above ")
@@ -259,9 +259,9 @@ def _attitude(said: GroundTexts, told: ToldPose | None) -> dict[str, Any]:
             else Quantity.parse(share, "1", name="--dip")
         )
     if said.horizon is not None:
-        return {**found, "horizon": Observation.parse(said.horizon, name="--horizon")}
+        return {**found, "horizon": _marked(said.horizon, "horizon")}
     if said.parallels is not None:
-        return {**found, "parallels": Observation.parse(said.parallels, name="--parallels")}
+        return {**found, "parallels": _marked(said.parallels, "parallels")}
     if said.pitch is not None:
         return {**found, "pitch": _angle(said.pitch, "--pitch", math.pi / 2)}
     if told is None:
@@ -270,6 +270,11 @@ def _attitude(said: GroundTexts, told: ToldPose | None) -> dict[str, Any]:
     if found["roll"] is None:
         found["roll"] = Quantity.normal(told.roll_rad, told.u_rad, "rad", told.source)
     return {**found, "pitch": Quantity.normal(told.pitch_rad, told.u_rad, "rad", told.source)}
+
+
+def _marked(text: str, field: str, count: int | None = None) -> Observation:
+    """Points that tell how the camera stands, labelled for the budget."""
+    return dataclasses.replace(Observation.parse(text, name=f"--{field}", count=count), label=f"the {field}")
 
 
 def _angle(text: str | None, name: str, limit_rad: float) -> Quantity | None:

@@ -9,6 +9,12 @@ from ..quantity import Measurement
 from ..reports.rounding import digits_for, fitting_unit, grouped
 
 CURES = (
+    ("pitch", "mark the horizon, or measure the pitch with a spirit level at the camera"),
+    ("roll", "mark the horizon, or level the camera"),
+    ("slope", "measure the slope of the ground and state its ±"),
+    ("rise", "give how much higher the ground there lies, or the height above it"),
+    ("elevation", "survey the height of the point"),
+    ("shape of the survey", "survey the points more closely"),
     ("focal length", "calibrate the camera at this focus (20 pictures of a board), or measure one known distance"),
     ("pixel aspect", "calibrate the camera"),
     ("principal point", "calibrate the camera, or keep the object near the middle of the picture"),
@@ -21,6 +27,7 @@ CURES = (
     ("distance", "measure the distance with a tape or a laser and state its ±"),
     ("tilt", "turn the object to face the camera and state its tilt, or use a target with four known points"),
     ("focus", "calibrate the camera at this focus"),
+    ("height", "measure the height with a tape or a laser and state its ±"),
     ("interaction", "lessen the largest of the other lines: the response bends"),
 )
 """A word of a budget line's name, and what lessens that line; the first that fits is taken."""
