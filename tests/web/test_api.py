@@ -684,6 +684,30 @@ def test_snapping_where_nothing_is_says_so(server, desk):
     assert error(server.client.post("/api/snap", json={**body, "points_px": []}))["name"] == "points_px"
 
 
+def test_an_outline_gives_extents_that_are_measured(server, desk):
+    """Of the bank card on the desk, by a box around it."""
+    body = {"photo": desk["id"], "place": [860, 680, 1085, 825]}
+    found = server.client.post("/api/outline", json=body).json()
+    assert {"longest", "shortest", "width", "height", "box"} == set(found["extents"])
+    contour = np.array(found["contour_px"])
+    assert contour.min(axis=0) == pytest.approx([871.7, 688.7], abs=2) and contour.max(axis=0) == pytest.approx(
+        [1073.6, 814.5], abs=2
+    )
+    ends = {key: found["extents"]["longest"][key] for key in OBSERVED}
+    item = {
+        "inputs": {found["points_field"]: ends, found["size_field"]: "101.2 mm"},
+        "photo": desk["id"],
+        "notes": found["notes"],
+    }
+    m = server.client.post(f"/api/measure/{found['method']}", json=item).json()["measurements"][0]
+    assert m["low"] < 0.59 < m["high"]
+    for place, word in (([10, 10, 12, 12], "box needs"), ([5000, 10], "1600 x 1200"), ([1, 2, 3], "give x, y")):
+        assert word in error(server.client.post("/api/outline", json={**body, "place": place}))["message"]
+    flat = server.photo(encoded(np.full((60, 80, 3), 128, np.uint8)), "flat.png")
+    found = error(server.client.post("/api/outline", json={"photo": flat["id"], "place": [40, 30]}))
+    assert found["type"] == "NothingFoundError" and "stands out" in found["message"]
+
+
 def encoded(pixels: np.ndarray) -> bytes:
     out = io.BytesIO()
     Image.fromarray(pixels).save(out, "PNG")

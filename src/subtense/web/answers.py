@@ -234,6 +234,24 @@ class Snapped(_Answer):
     notes: list[Doubt]
 
 
+class Outlined(_Answer):
+    """The outline of a thing, and its extents, each as two ends with their covariance.
+
+    Put an extent into the field `points_field` of `method`, and its real size into `size_field`.
+    """
+
+    contour_px: list[Limits2] = Field(description="around the thing")
+    extents: dict[str, Observation] = Field(
+        description="longest, shortest, width, height; box: the corners of the narrowest"
+    )
+    area_px: float = Field(description="in square pixels")
+    u_area_px: float
+    notes: list[Doubt] = Field(description="for `notes` of a measurement")
+    method: str
+    points_field: str
+    size_field: str
+
+
 class Fault(_Answer):
     """As `error` of any answer."""
 

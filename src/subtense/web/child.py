@@ -15,12 +15,15 @@ import signal
 import struct
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..arrays import Pixels
 from ..errors import InputError, MissingExtraError, SubtenseError
+
+if TYPE_CHECKING:
+    from ..photo import Photo
 
 SPARE_BYTES = 64 * 2**20
 """What a decoder needs at the least, beside what this process has when it starts."""
@@ -192,25 +195,31 @@ def _pyramid(pixels: Pixels, tile_px: int) -> list[tuple[int, int]]:
     return sizes
 
 
+def _decoded(task: dict[str, Any]) -> Photo:
+    """The picture that was decoded before, whose pixels are in `path`."""
+    from ..photo import Metadata, Photo
+
+    width, height = task["size"]
+    return Photo(np.memmap(task["path"], np.uint8, "r", shape=(height, width, 3)), Metadata(), Path(task["name"]), "")
+
+
 def detect(task: dict[str, Any]) -> dict[str, Any]:
-    """Search the decoded picture whose pixels are in `path`, with a row of DETECTORS or all that look unasked."""
+    """Search the decoded picture with a row of DETECTORS, or all that look unasked."""
     from ..camera import Camera
     from ..detection import Search, parse_curve, unknown_curve
-    from ..photo import Metadata, Photo
     from ..targets import find_target
     from ..workflow.detect import detect as detect_in
     from ..workflow.detect import detection_json
     from ..workflow.measure import assumed
 
-    width, height = task["size"]
-    pixels = np.memmap(task["path"], np.uint8, "r", shape=(height, width, 3))
-    photo = Photo(pixels, Metadata(), Path(task["name"]), "")
     stated = tuple(find_target(name) for name in task["targets"])
     search = Search(
         stated, task["family"], parse_curve(task["curve"]) if task["curve"] else unknown_curve(), task["thorough"],
         camera=Camera.from_json(task["camera"]) if task["camera"] else None,
     )  # fmt: skip
-    found = detect_in(photo, task["only"], search, progress=lambda title, share: say(progress=share, doing=title))
+    found = detect_in(
+        _decoded(task), task["only"], search, progress=lambda title, share: say(progress=share, doing=title)
+    )
     detections = [
         {
             **detection_json(one),
@@ -222,7 +231,22 @@ def detect(task: dict[str, Any]) -> dict[str, Any]:
     return {"detections": detections, "notes": [note.to_json() for note in found.notes]}
 
 
-TASKS = {"decode": decode, "detect": detect}
+def outline(task: dict[str, Any]) -> dict[str, Any]:
+    """The outline of what is at `place` of the decoded picture."""
+    from ..workflow.detect import WAYS
+    from ..workflow.outline import outlined
+
+    found, extents, notes = outlined(_decoded(task), np.array(task["place"]), person=task["person"])
+    way = WAYS["length"]
+    return {
+        "contour_px": np.round(found.contour.points_px, 2).tolist(),
+        "extents": {name: seen.to_json() for name, seen in extents.items()}, "area_px": found.area_px,
+        "u_area_px": found.u_area_px, "notes": [note.to_json() for note in notes], "method": way.method,
+        "points_field": way.points, "size_field": way.size,
+    }  # fmt: skip
+
+
+TASKS = {"decode": decode, "detect": detect, "outline": outline}
 
 if __name__ == "__main__":
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

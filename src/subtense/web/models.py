@@ -171,6 +171,18 @@ class Snap(_Body):
     model_config = _shown({"photo": _ID, "points_px": [[394, 372], [748, 368]]})
 
 
+class OutlineOf(_Body):
+    """A thing, by a point on it or a box around it."""
+
+    photo: PhotoId
+    place: Annotated[
+        list[float], Field(min_length=2, max_length=4, description="x, y of a point, or x1, y1, x2, y2 of a box, px")
+    ]
+    person: bool = Field(False, strict=True, description="cut a person out, by a network; needs the extra networks")
+
+    model_config = _shown({"photo": _ID, "place": [860, 680, 1085, 825]})
+
+
 class Keep(_Body):
     """The photos a page still shows."""
 

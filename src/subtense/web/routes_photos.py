@@ -212,9 +212,11 @@ def _method(name: str) -> Any:
 
 
 async def _search(request: Request, photo: Held, task: dict[str, Any], job: Job | None = None) -> dict[str, Any]:
-    """What rows of DETECTORS see, by a child process."""
+    """What a child process sees in the photo."""
     state = state_of(request)
     limits = state.settings.limits
+    height, width = photo.levels[0].shape[:2]
+    task |= {"name": photo.photo.name, "path": str(photo.folder / "pixels.bin"), "size": [width, height]}
     async with state.children.place():
         found: dict[str, Any] = await state.children.run(
             task, photo.folder, cpu_s=limits.job_s, wall_s=limits.job_s, file_bytes=2**20, memory_bytes=2 * limits.memory_bytes,
@@ -239,11 +241,9 @@ def _task(request: Request, name: str, photo: Held, body: models.Search) -> dict
         field = {"--target": "targets", "--curve": "curve"}.get(error.name, error.name)
         raise InputError(field, error.given, error.allowed) from None
     camera = camera_for(state_of(request), photo, body.camera)
-    pixels = photo.levels[0]
     return {
-        "do": "detect", "only": only, "name": photo.photo.name, "path": str(photo.folder / "pixels.bin"),
-        "size": [pixels.shape[1], pixels.shape[0]], "targets": [one.name for one in wanted], "family": body.family,
-        "curve": body.curve, "thorough": body.thorough,
+        "do": "detect", "only": only, "targets": [one.name for one in wanted], "family": body.family, "curve": body.curve,
+        "thorough": body.thorough,
         "camera": None if isinstance(camera, UnknownCameraError) else camera.camera.to_json(),
     }  # fmt: skip
 
@@ -286,6 +286,18 @@ def post_snap(request: Request, body: models.Snap) -> Response:
         raise InputError("curve", error.given, error.allowed) from None
     found, notes = snapped(photo.photo, marked, curve, radius_px=body.radius_px)
     return JSONResponse({"observation": found.to_json(), "notes": [note.to_json() for note in notes]})
+
+
+@router.post("/outline", summary="The outline of a thing, by a click or a box", responses=gives(shapes.Outlined))
+async def post_outline(request: Request, body: models.OutlineOf) -> Response:
+    """Its contour at the edges, and its extents with their covariance: what a real size makes a distance of."""
+    photo = held(request, body.photo)
+    if len(body.place) == 3:
+        raise InputError(
+            "place", "3 numbers", "give x, y of a point on the thing, or x1, y1, x2, y2 of a box around it"
+        )
+    task = {"do": "outline", "place": body.place, "person": body.person}
+    return JSONResponse(await _search(request, photo, task))
 
 
 JobId = Annotated[str, InPath(pattern="^[A-Za-z0-9_-]{16}$")]

@@ -15,6 +15,7 @@ from ..detectors.outline import outline
 from ..document import Document, Shape
 from ..errors import InputError
 from ..methods import known_size
+from ..observation import Observation
 from ..outline import EXTENTS, Outline
 from ..photo import Photo
 from ..quantity import Note, Quantity
@@ -74,6 +75,25 @@ def outline_document(
         document = measure_item(Item(known_size.METHOD, inputs, label), photo, resolved, level=level, seed=seed)
         documents.append(_whole(document, found, (*found.notes, *doubts), label))
     return joined(documents)
+
+
+def outlined(
+    photo: Photo, where: Array, *, person: bool = False
+) -> tuple[Outline, dict[str, Observation], tuple[Note, ...]]:
+    """An outline, its extents judged by the picture's quality, and all doubts.
+
+    Args:
+        photo: the picture.
+        where: (2,) a point on the thing, or (4,) a box around it, px.
+        person: whether it is a person, whom a network cuts out.
+
+    Raises:
+        InputError, NothingFoundError, MissingExtraError: as `detectors.outline`.
+    """
+    found = outline(photo, where, Search(model=_model("person" if person else None)))
+    graded = {name: graded_contour(photo, seen, found.contour.points_px) for name, seen in found.extents.items()}
+    doubts = next(iter(graded.values()))[1]  # of the contour, and so of all extents
+    return found, {name: seen for name, (seen, _) in graded.items()}, (*found.notes, *doubts)
 
 
 def place(text: str) -> Array:
