@@ -85,7 +85,7 @@ def _caption(document: Document, label: str) -> list[str]:
     doubt = m.u if m.u is not None else m.value / 10
     decimals = max(digits_for(doubt / factor), 0)
     low, high = (None if x is None else grouped(x / factor, decimals) for x in (m.low, m.high))
-    lines = [f"{m.what} {grouped(m.value / factor, decimals)} {name}"]
+    lines = [f"{m.what.replace('_', ' ')} {grouped(m.value / factor, decimals)} {name}"]
     if m.u != 0:
         lines.append(f"{100 * m.level:g} %: {low or '0'} to {high or 'open'} {name}")
     return [label, *lines] if label else lines

@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from ..document import Document
+from ..document import Document, Shape
 from ..errors import InputError
 from ..methods import ground_footprint, ground_length, ground_plane, ground_sampling, ground_speed
 from ..observation import Observation
@@ -137,7 +137,21 @@ def ground_document(
         found = measure_item(items[0], photo, resolved, level=level, seed=seed)
     else:
         found = measure_items(items, photo, resolved, level=level, seed=seed)
-    return dataclasses.replace(found, measurements=tuple(_resolved(m) for m in found.measurements))
+    return dataclasses.replace(
+        found, measurements=tuple(_resolved(m) for m in found.measurements), shapes=_drawn(found.shapes)
+    )
+
+
+def _drawn(shapes: Sequence[Shape]) -> tuple[Shape, ...]:
+    """What all points share drawn once, and level lines each on its own."""
+    kept: list[Shape] = []
+    for shape in dict.fromkeys(shapes):
+        if shape.label != "parallels":
+            kept.append(shape)
+            continue
+        ends = [shape.points_px[i : i + 2] for i in range(0, len(shape.points_px), 2)]
+        kept += [Shape(pair, False, "parallels") for pair in ends]
+    return tuple(kept)
 
 
 def _items(
