@@ -9,22 +9,23 @@ Source: the segments are those of R. Grompone von Gioi, J. Jakubowicz, J.-M. Mor
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array, Pixels
+from .arrays import Array, Bools, Pixels
 
 MOST_SEGMENTS = 900
-MOST_LINES = 400
+MOST_LINES = 1200
 MOST_MIXED = 140
 """Lines where sides may be lighter or darker than their ground, each for itself: there are eight times as many rings."""
 SHORTEST_PX = 9.0
 ALIKE = math.radians(2.5)
 """Segments that differ by less in direction may be of one line."""
 BESIDE_PX = 1.6
-JUMP = 0.8
-"""Of the longer segment: a gap that two segments of a line may have between them."""
+JUMPS = (0.8, 2.0)
+"""Of the longer segment: a gap that two segments of a line may have between them; each makes lines of its own."""
 BEYOND = 0.45
 """Of a line's length: how far from its end a corner may lie."""
 BEFORE = 0.12
@@ -32,7 +33,7 @@ BEFORE = 0.12
 LEAST_TURN = math.radians(28.0)
 LEAST_COVERED = 0.25
 LEAST_MEAN_COVERED = 0.55
-_MOST_RINGS = 30_000
+_MOST_RINGS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,37 +51,50 @@ class Rough:
     light: bool | None
 
     @property
+    def weight(self) -> float:
+        """For an order: what is mostly seen, and of that the larger, which chance makes less often."""
+        return float(self.covered**2 * self.area**0.25)
+
+    @property
     def area(self) -> float:
         """Square pixels."""
         x, y = self.corners_px.T
         return float(abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2)
 
 
-def quads(gray: Pixels, *, least_side_px: float = 12.0, mixed: bool = False) -> list[Rough]:
-    """Quadrilaterals with their sides mostly seen, best covered first.
+def straight_lines(gray: Pixels) -> Array:
+    """(L, 2, 2) ends of straight lines in a picture, longest first; the light is on the same side of all.
 
     Args:
         gray: (H, W) uint8.
+    """
+    return _lines(_segments(gray)) if min(gray.shape) >= 16 else np.zeros((0, 2, 2))
+
+
+def quads(lines: Array, *, least_side_px: float = 12.0, mixed: bool = False) -> list[Rough]:
+    """Quadrilaterals with their sides mostly seen, best seen first.
+
+    Args:
+        lines: (L, 2, 2) of `straight_lines`.
         least_side_px: shorter sides are left out.
         mixed: whether some sides may be lighter and some darker than what is beside them; else all are alike.
     """
-    if min(gray.shape) < 16:
-        return []
-    lines = _lines(_segments(gray))
     if len(lines) < 4:
         return []
     rings = _rings(lines[:MOST_MIXED]) if mixed else _rings_of_one_kind(lines)
-    found = [_rough(lines, ring, least_side_px, mixed=mixed) for ring in rings]
-    return sorted((one for one in found if one is not None), key=lambda one: -one.covered)
+    return sorted(_roughs(lines, rings, least_side_px, mixed=mixed), key=lambda one: -one.weight)
 
 
-def distinct(found: list[Rough], apart_px: float) -> list[Rough]:
+def distinct(found: Sequence[Rough], apart_px: float) -> list[Rough]:
     """Those whose corners differ from all better ones by more than `apart_px` somewhere."""
     kept: list[Rough] = []
+    places = np.zeros((0, 4, 2))
     for one in found:
-        turned = [np.roll(one.corners_px, k, axis=0) for k in range(4)]
-        if all(min(np.abs(t - other.corners_px).max() for t in turned) > apart_px for other in kept):
+        turned = np.stack([np.roll(one.corners_px, k, axis=0) for k in range(4)])
+        apart = np.abs(places[:, None] - turned[None]).max(axis=(2, 3))
+        if not len(kept) or apart.min() > apart_px:
             kept.append(one)
+            places = np.concatenate([places, one.corners_px[None]])
     return kept
 
 
@@ -99,13 +113,8 @@ def _segments(gray: Pixels) -> Array:
 
 def _lines(segments: Array) -> Array:
     """(L, 2, 2) ends of lines, longest first; the parts of a joined line are lines too."""
-    groups: list[list[int]] = []
-    used: set[int] = set()
-    for i in range(len(segments)):
-        group = _grown(segments, i)
-        if len(group) > 1 and not set(group) <= used:
-            groups.append(group)
-            used |= set(group)
+    grown = (tuple(_grown(segments, i, jump)) for jump in JUMPS for i in range(len(segments)))
+    groups = [list(group) for group in dict.fromkeys(grown) if len(group) > 1]
     single = [[i] for i in range(len(segments))]
     every = np.array([_span(segments, group) for group in (*groups, *single)]).reshape(-1, 2, 2)
     length = np.hypot(*(every[:, 1] - every[:, 0]).T)
@@ -113,7 +122,7 @@ def _lines(segments: Array) -> Array:
     return np.asarray(every[order[length[order] >= SHORTEST_PX]][:MOST_LINES])
 
 
-def _grown(segments: Array, seed: int) -> list[int]:
+def _grown(segments: Array, seed: int, jump: float) -> list[int]:
     """The seed and what lies on its line without too long a gap."""
     a, b = segments[seed]
     group = [seed]
@@ -129,7 +138,7 @@ def _grown(segments: Array, seed: int) -> list[int]:
         near = (
             (np.abs(off).max(axis=1) < BESIDE_PX + 0.006 * length)
             & (turn < math.sin(2 * ALIKE))
-            & (gap < max(12.0, JUMP * length))
+            & (gap < max(12.0, jump * length))
         )
         new = sorted({seed, *np.flatnonzero(near).tolist()})
         if new == group:
@@ -154,23 +163,25 @@ def _span(segments: Array, group: list[int]) -> tuple[Array, Array]:
     return middle + place.min() * along, middle + place.max() * along
 
 
-def _rings_of_one_kind(lines: Array) -> list[tuple[int, int, int, int]]:
-    """Four lines, each from its end on to the start of the next: the light is within all of them, or beyond all."""
-    joined = _joined(lines)[:, 1, :, 0]
-    after = [np.flatnonzero(row) for row in joined]
+def _rings_of_one_kind(lines: Array) -> Array:
+    """(R, 4) lines, each from its end on to the start of the next: the light is within all of them, or beyond all."""
+    place, turned, length = _places(lines)
+    at_end = turned & _near_end(place, length, last=True) & _near_end(place, length, last=False).T
+    after = [np.flatnonzero(row) for row in at_end]
     found: list[tuple[int, int, int, int]] = []
     for i in range(len(lines)):
+        before = at_end[:, i]
         for j in after[i][after[i] > i]:
-            for k in after[j][(after[j] > i) & (after[j] != j)]:
-                last = np.flatnonzero(joined[k] & joined[:, i])
-                found += [(i, int(j), int(k), int(m)) for m in last if m > i and m not in (j, k)]
+            for k in after[j][after[j] > i]:
+                last = after[k][before[after[k]]]
+                found += [(i, int(j), int(k), int(m)) for m in last if m > i and m != j]
         if len(found) >= _MOST_RINGS:
             break
-    return found
+    return np.array(found, int).reshape(-1, 4)
 
 
-def _rings(lines: Array) -> list[tuple[int, int, int, int]]:
-    """Four lines, each joined by its two ends to the one before and the one after."""
+def _rings(lines: Array) -> Array:
+    """(R, 4) lines, each joined by its two ends to the one before and the one after."""
     joined = _joined(lines)
     after = [[np.flatnonzero(joined[i, e].any(axis=1)) for e in (0, 1)] for i in range(len(lines))]
     found: list[tuple[int, int, int, int]] = []
@@ -190,54 +201,65 @@ def _rings(lines: Array) -> list[tuple[int, int, int, int]]:
                                 if joined[last, 1 - h, i, 0]:
                                     found.append((i, int(j), int(k), int(last)))
                                     if len(found) >= _MOST_RINGS:
-                                        return found
-    return found
+                                        return np.array(found, int)
+    return np.array(found, int).reshape(-1, 4)
 
 
-def _joined(lines: Array) -> Array:
+def _joined(lines: Array) -> Bools:
     """(L, 2, L, 2) whether end e of line i meets end f of line j in a corner."""
+    place, turned, length = _places(lines)
+    at_end = np.stack([_near_end(place, length, last=last) for last in (False, True)], 1)
+    return np.asarray(turned[:, None, :, None] & at_end[:, :, :, None] & at_end.transpose(2, 0, 1)[:, None])
+
+
+def _places(lines: Array) -> tuple[Array, Bools, Array]:
+    """(L, L) where along line i it meets line j, whether the two stand at an angle, and (L,) their lengths."""
     start, step = lines[:, 0], lines[:, 1] - lines[:, 0]
     length = np.hypot(*step.T)
     along = step / length[:, None]
     cross = along[:, None, 0] * along[None, :, 1] - along[:, None, 1] * along[None, :, 0]
     turned = abs(cross) > math.sin(LEAST_TURN)
-    safe = np.where(turned, cross, 1.0)
     apart = start[None, :] - start[:, None]
-    place = (apart[..., 0] * along[None, :, 1] - apart[..., 1] * along[None, :, 0]) / safe  # along i, from its start
-    beyond, before = BEYOND * length + 5.0, BEFORE * length + 3.0
-    at_end = np.stack(
-        [(place > -beyond[:, None]) & (place < before[:, None]),
-         (place > (length - before)[:, None]) & (place < (length + beyond)[:, None])], 1
-    )  # fmt: skip
-    return np.asarray(turned[:, None, :, None] & at_end[:, :, :, None] & at_end.transpose(2, 0, 1)[:, None])
+    place = (apart[..., 0] * along[None, :, 1] - apart[..., 1] * along[None, :, 0]) / np.where(turned, cross, 1.0)
+    return place, turned, length
 
 
-def _rough(lines: Array, ring: tuple[int, ...], least: float, *, mixed: bool) -> Rough | None:
-    four = lines[list(ring)]
-    corners = np.array([_cross(four[i - 1], four[i]) for i in range(4)])
-    if not np.all(np.isfinite(corners)):
-        return None
-    edge = np.roll(corners, -1, axis=0) - corners
-    following = np.roll(edge, -1, axis=0)
-    turn = edge[:, 0] * following[:, 1] - edge[:, 1] * following[:, 0]
-    sides = np.hypot(*edge.T)
-    if not (np.all(turn > 0) or np.all(turn < 0)) or sides.min() < least:
-        return None
-    covered = []
-    for i in range(4):
-        along = edge[i] / sides[i]
-        place = np.sort((four[i] - corners[i]) @ along)
-        covered.append(max(0.0, min(place[1], sides[i]) - max(place[0], 0.0)) / sides[i])
-    if min(covered) < LEAST_COVERED or np.mean(covered) < LEAST_MEAN_COVERED:
-        return None
-    light = None if mixed else bool(turn[0] < 0)  # segments have the light on their left
-    return Rough(corners if turn[0] > 0 else corners[::-1], float(np.mean(covered)), light)
+def _near_end(place: Array, length: Array, *, last: bool) -> Bools:
+    """(L, L) whether a meeting point is at the last (or first) end of line i."""
+    beyond, before, end = (BEYOND * length + 5.0)[:, None], (BEFORE * length + 3.0)[:, None], length[:, None]
+    if last:
+        return (place > end - before) & (place < end + beyond)
+    return (place > -beyond) & (place < before)
+
+
+def _roughs(lines: Array, rings: Array, least: float, *, mixed: bool) -> list[Rough]:
+    """The rings that are convex, large enough, and mostly seen."""
+    if not len(rings):
+        return []
+    four = lines[rings]
+    corners = np.stack([_cross(four[:, i - 1], four[:, i]) for i in range(4)], 1)
+    edge = np.roll(corners, -1, axis=1) - corners
+    following = np.roll(edge, -1, axis=1)
+    turn = edge[..., 0] * following[..., 1] - edge[..., 1] * following[..., 0]
+    sides = np.hypot(edge[..., 0], edge[..., 1])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = edge / sides[..., None]
+        place = np.sort(np.sum((four - corners[:, :, None]) * along[:, :, None], -1), axis=-1)
+        covered = (np.minimum(place[..., 1], sides) - np.maximum(place[..., 0], 0.0)).clip(0.0) / sides
+        good = (np.all(turn > 0, axis=1) | np.all(turn < 0, axis=1)) & (sides.min(axis=1) >= least)
+        good &= (covered.min(axis=1) >= LEAST_COVERED) & (covered.mean(axis=1) >= LEAST_MEAN_COVERED)
+    good &= np.isfinite(corners).all(axis=(1, 2))
+    out = []
+    for ring in np.flatnonzero(good):
+        clockwise = bool(turn[ring, 0] > 0)
+        light = None if mixed else not clockwise  # segments have the light on their left
+        out.append(Rough(corners[ring] if clockwise else corners[ring, ::-1], float(covered[ring].mean()), light))
+    return out
 
 
 def _cross(one: Array, other: Array) -> Array:
-    d, e = one[1] - one[0], other[1] - other[0]
-    den = d[0] * e[1] - d[1] * e[0]
-    if abs(den) < 1e-9:
-        return np.full(2, np.nan)
-    apart = other[0] - one[0]
-    return np.asarray(one[0] + (apart[0] * e[1] - apart[1] * e[0]) / den * d)
+    """(R, 2) where lines (R, 2, 2) meet."""
+    d, e, apart = one[:, 1] - one[:, 0], other[:, 1] - other[:, 0], other[:, 0] - one[:, 0]
+    den = d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(one[:, 0] + ((apart[:, 0] * e[:, 1] - apart[:, 1] * e[:, 0]) / den)[:, None] * d)

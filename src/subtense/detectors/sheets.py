@@ -22,7 +22,7 @@ from ..detection import Detection, Search
 from ..edges import LEAST_STEP, Patch
 from ..observation import Observation
 from ..photo import Photo
-from ..quads import Rough, distinct, quads
+from ..quads import Rough, distinct, quads, straight_lines
 from ..quantity import Note
 from ..sheet_kinds import AS_WELL, KindFit, kind_fits, usual_cameras
 from ..straight import Outline, outline
@@ -39,9 +39,9 @@ ROUGH_PX = 1.5
 """Standard deviation of a corner of the reduced picture."""
 QUICK_PX = 0.5
 """The same after a quick look at the sides."""
-MOST_ROUGH = 400
-MOST_LOOKED_AT = 100
-MOST_LOCATED = 10
+MOST_ROUGH = 1500
+MOST_LOOKED_AT = 120
+MOST_LOCATED = 6
 """Quadrilaterals that are found, looked at quickly, and located."""
 TELLS_LITTLE = 0.1
 """Relative standard deviation of the aspect beyond which it says little of the kind."""
@@ -74,7 +74,7 @@ class _Rules:
     one_sided: float
 
 
-STRICT, WILLING = _Rules(0.85, 0.6, 0.9), _Rules(0.6, 0.3, 0.6)
+STRICT, WILLING = _Rules(0.85, 0.6, 0.9), _Rules(0.75, 0.3, 0.6)
 
 
 def sheets(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]:
@@ -94,11 +94,12 @@ def sheets(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]:
         return ()
     cameras = [(search.camera, 1.0)] if search.camera else usual_cameras(photo.width_px, photo.height_px)
     kinds = told or tuple(one for one in targets().values() if one.shape == "rectangle" and one.group in UNASKED)
-    gray = gray_of(photo.pixels)
-    for number, picture in enumerate(_pictures(gray, several=bool(told) or search.thorough)):
-        for mixed in (False, True) if told else (False,):
-            found = _found(photo, picture, search, (cameras, kinds), told=bool(told), mixed=mixed)
-            search.progress(min(1.0, 0.4 * (number + 1) + 0.2 * mixed))
+    pictures = _pictures(gray_of(photo.pixels), several=bool(told) or search.thorough)
+    for number, picture in enumerate(pictures):
+        lines = straight_lines(picture.pixels)
+        for mixed in (False, True) if told and number == 0 else (False,):
+            found = _found(photo, picture, lines, search, (cameras, kinds), told=bool(told), mixed=mixed)
+            search.progress((number + 1) / len(pictures))
             if found:
                 return tuple(sorted(found, key=lambda one: float(one.seen.points_px[:, 0].mean())))
     return ()
@@ -114,7 +115,7 @@ def _pictures(gray: Pixels, *, several: bool) -> list[Reduced]:
         height, width = (round(scale * side) for side in gray.shape)
         larger = np.asarray(cv2.resize(gray, (width, height), interpolation=cv2.INTER_CUBIC))
         return [Reduced(larger, width / gray.shape[1], height / gray.shape[0])]
-    sides = [FINDING_PX, 2 * FINDING_PX] if several and longest > FINDING_PX else [FINDING_PX]
+    sides = [FINDING_PX, 2 * FINDING_PX] if several and longest > 2 * FINDING_PX else [FINDING_PX]
     return [reduced(gray, side) for side in sides]
 
 
@@ -123,13 +124,13 @@ Choice = tuple[Sequence[tuple[Camera, float]], Sequence[KnownTarget]]
 
 
 def _found(
-    photo: Photo, picture: Reduced, search: Search, choice: Choice, *, told: bool, mixed: bool
+    photo: Photo, picture: Reduced, lines: Array, search: Search, choice: Choice, *, told: bool, mixed: bool
 ) -> list[Detection]:  # fmt: skip
     cameras, kinds = choice
-    rules = WILLING if told else STRICT
+    rules = WILLING if told and not mixed else STRICT
     located: list[_Located] = []
     tried = 0
-    for one, corners in _candidates(photo, picture, choice, mixed=mixed):
+    for one, corners in _candidates(photo, picture, lines, choice, mixed=mixed):
         patch = _patch(photo, corners, search, 2.0 + 2.0 / picture.scale_x)
         quick = outline(patch, corners, reach_px=2.0 + 2.0 / picture.scale_x, fine=False)
         if quick is None or not _seen_enough(quick, rules, one.light) or not kind_fits(
@@ -152,16 +153,18 @@ def _found(
     return [found for one in located if (found := _unasked(picture, one)) is not None]
 
 
-def _candidates(photo: Photo, picture: Reduced, choice: Choice, *, mixed: bool) -> list[tuple[Rough, Array]]:
+def _candidates(
+    photo: Photo, picture: Reduced, lines: Array, choice: Choice, *, mixed: bool
+) -> list[tuple[Rough, Array]]:
     """Quadrilaterals that may be one of the kinds, with their corners in full pixels; best seen first."""
     cameras, kinds = choice
     spread = (ROUGH_PX / min(picture.scale_x, picture.scale_y)) ** 2 * np.eye(8)
-    found = []
-    for one in distinct(quads(picture.pixels, mixed=mixed)[:MOST_ROUGH], 3.0):
+    fitting = []
+    for one in quads(lines, mixed=mixed)[:MOST_ROUGH]:
         corners = picture.full(one.corners_px)
         if _inside(photo, corners) and kind_fits(corners, spread, cameras, kinds):
-            found.append((one, corners))
-    return found[:MOST_LOOKED_AT]
+            fitting.append(one)
+    return [(one, picture.full(one.corners_px)) for one in distinct(fitting, 3.0)[:MOST_LOOKED_AT]]
 
 
 def _patch(photo: Photo, corners: Array, search: Search, reach: float) -> Patch:
