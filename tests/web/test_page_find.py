@@ -273,6 +273,43 @@ def test_a_disc_takes_as_many_points_as_one_likes(visit, examples):
     assert "C" in page.locator("[data-shape=A] path.line").get_attribute("d")  # drawn round
 
 
+# -- outlines --------------------------------------------------------------------------------------------
+
+
+def test_an_outline_by_a_box_or_a_click_is_measured_by_one_of_its_extents(visit, examples):
+    page = opened(visit, examples / "desk.jpg")
+    draw(page, "Outline", stage(page, 860, 680), stage(page, 1085, 825), drag=True)
+    row = page.locator("table.rows tbody")
+    row.get_by_label("Real size of A").fill("101.2 ± 0.5 mm")
+    page.keyboard.press("Tab")
+    expect(row.locator("strong")).to_have_text(re.compile("mm"))
+    low, high = re.search(r"(\d+) to (\d+)", row.locator("td.number").inner_text()).groups()
+    assert int(low) < 590 < int(high)
+    extent = page.get_by_test_id("details").get_by_label("Which extent of the outline")
+    expect(extent).to_have_value("longest")
+    (x1, y1), (x2, y2) = at(page, "A", 0), at(page, "A", 1)
+    assert np.hypot(x2 - x1, y2 - y1) == pytest.approx(212, abs=3)
+    extent.select_option("width")
+    expect(page.locator("[data-handle='A-ends-1']")).to_have_attribute("aria-label", re.compile(r"at 1\d+\.\d, 7"))
+    (x1, _), (x2, _) = sorted((at(page, "A", 0), at(page, "A", 1)))
+    assert (x1, x2) == pytest.approx((871.7, 1073.6), abs=2)
+    page.locator("[data-handle='A-ends-0']").focus()
+    page.keyboard.press("ArrowLeft")
+    expect(extent).to_have_value("")
+    expect(page.locator("[data-shape=A] path.contour")).to_be_visible()
+    page.reload()
+    expect(page.locator("[data-shape=A] path.contour")).to_be_visible()
+
+
+def test_an_outline_of_nothing_says_so(visit, tmp_path):
+    visit.expected = "422"
+    Image.new("RGB", (600, 400), (128, 128, 128)).save(tmp_path / "blank.png")
+    page = opened(visit, tmp_path / "blank.png")
+    draw(page, "Outline", (400, 300))
+    expect(page.get_by_role("status").filter(has_text="stands out")).to_be_visible()
+    expect(page.locator("[data-shape]")).to_have_count(0)
+
+
 @pytest.mark.parametrize(("size", "theme"), [("desktop", "dark"), ("phone", "light")])
 def test_axe_finds_nothing_in_what_was_found(browser, server, examples, size, theme):
     visit = visiting(browser, server, size, theme)

@@ -151,6 +151,15 @@ export interface Detection extends Seen {
   size_prefix: string;
   size_text: string | null;
 }
+/** The outline of a thing, and its extents, each as two ends. */
+export interface Outlined {
+  contour_px: [number, number][];
+  extents: Record<string, Seen>;
+  notes: Note[];
+  method: string;
+  points_field: string;
+  size_field: string;
+}
 export interface Job {
   id: string;
   state: "running" | "done" | "failed" | "cancelled";

@@ -1,8 +1,8 @@
 /** The measuring page's state: session with undo, photos on the server, answers; what is drawn and pressed is in the components. */
-import { ApiError, get, Latest, post, send, type CameraSaid, type Detection, type Doc, type GivenCamera, type MethodRow, type Note, type Photo, type Seen, type Tables, type Target } from "../lib/api";
+import { ApiError, get, Latest, post, send, type CameraSaid, type Detection, type Doc, type GivenCamera, type MethodRow, type Note, type Outlined, type Photo, type Seen, type Tables, type Target } from "../lib/api";
 import { store } from "../lib/store";
 import { Undo } from "../lib/undo";
-import { EMPTY, inputsOf, nextLabel, notesOf, PROJECT, readProject, readSheet, sameFound, shapeOf, sigmaOf, snappedTo, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
+import { EMPTY, inputsOf, nextLabel, notesOf, outlineShape, PROJECT, readProject, readSheet, sameFound, shapeOf, sigmaOf, snappedTo, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
 
 export type Answer = { state: "done"; doc: Doc } | { state: "wants"; fields: string[] } | { state: "refused"; message: string; field: string | null } | { state: "waits" };
 
@@ -209,6 +209,21 @@ export class Model {
     if (index === this.session.current) this.selected = made.length === 1 ? made[0]!.id : null;
     this.measureSheet(this.session.sheets[index]!);
     return { made: made.length, known: all.length - made.length, unsized: made.filter((shape) => !shape.texts[shape.found!.field]).length };
+  }
+
+  /** Have the outline of what is at a place found: x, y of a point, or x1, y1, x2, y2 of a box. */
+  async outline(place: readonly number[]): Promise<void> {
+    const photo = this.sheet?.photo.id;
+    if (!photo) return;
+    this.said = "Looking for its outline…";
+    try {
+      const found = await this.withPhoto(photo, () => post<Outlined>("/api/outline", { photo, place }));
+      this.said = "";
+      this.add([outlineShape(found)], [], photo);
+    } catch (error) {
+      this.said = "";
+      if (!this.unreachable(error)) this.said = error instanceof Error ? error.message : String(error);
+    }
   }
 
   /** Move the points of a shape to the edges near them, where there are some; a step of undo of its own. */

@@ -1,5 +1,5 @@
 /** What a person measures: photos, their cameras, the shapes drawn on them. Plain data, never changed in place. */
-import type { Detection, GivenCamera, MethodRow, Note, Photo, Seen } from "../lib/api";
+import type { Detection, GivenCamera, MethodRow, Note, Outlined, Photo, Seen } from "../lib/api";
 
 export type Point = readonly [x: number, y: number];
 
@@ -19,6 +19,14 @@ export interface Shape {
   found?: Found;
   /** Where points stood that were moved to the edges near them, by field, and what is doubtful about it. */
   snapped?: Readonly<Record<string, Snapped>>;
+  /** The outline that its points are an extent of. */
+  outline?: OutlineOf;
+}
+
+export interface OutlineOf {
+  field: string;
+  contour: readonly Point[];
+  extents: Readonly<Record<string, Seen>>;
 }
 
 export interface Found {
@@ -52,6 +60,8 @@ export interface Session {
 
 export const EMPTY: Session = { sheets: [], current: 0 };
 export const CLICK_SIGMA = 0.7;
+/** The tool that is no method's: it finds the outline of a thing. */
+export const OUTLINE = " outline";
 
 const LEAST_OF_MANY = 5;
 
@@ -139,6 +149,36 @@ export function shapeOf(one: Detection, told: string): Omit<Shape, "id" | "label
     seen: { [one.points_field]: { points_px, sigma_px, cov, label, score, source } },
     found: { detector: one.detector, field: one.size_field, prefix: one.size_prefix, text: one.size_text, target: one.target, others: one.others, tilt: one.tilt, notes: one.notes },
   };
+}
+
+/** The longest extent of an outline as a measurement without a name. */
+export function outlineShape(one: Outlined): Omit<Shape, "id" | "label"> {
+  const extents = Object.fromEntries(Object.entries(one.extents).filter(([, seen]) => seen.points_px.length === 2));
+  const longest = extents.longest ?? Object.values(extents)[0]!;
+  return {
+    method: one.method,
+    points: { [one.points_field]: longest.points_px },
+    texts: {},
+    sigma: "",
+    seen: { [one.points_field]: longest },
+    found: { detector: "outline", field: one.size_field, prefix: "", text: null, target: null, others: [], tilt: null, notes: one.notes },
+    outline: { field: one.points_field, contour: one.contour_px, extents },
+  };
+}
+
+/** Which extent of its outline a measurement is of; empty where its points were moved. */
+export function extentOf(shape: Shape): string {
+  const points = shape.points[shape.outline?.field ?? ""];
+  return Object.entries(shape.outline?.extents ?? {}).find(([, seen]) => shape.seen && JSON.stringify(seen.points_px) === JSON.stringify(points))?.[0] ?? "";
+}
+
+/** The measurement with another extent of its outline. */
+export function withExtent(shape: Shape, name: string): Shape {
+  const { outline } = shape;
+  const seen = outline?.extents[name];
+  if (!outline || !seen) return shape;
+  const moved = withPoints(shape, outline.field, seen.points_px);
+  return { ...moved, seen: { ...moved.seen, [outline.field]: seen } };
 }
 
 /** Whether two measurements are of the same thing found: by the same detector, at the same place. */
@@ -305,7 +345,8 @@ function readShape(value: unknown): Shape | null {
   const seen = shape.seen && typeof shape.seen === "object" ? { seen: shape.seen } : {};
   const found = isFound(shape.found) ? { found: shape.found } : {};
   const snapped = isSnapped(shape.snapped) ? { snapped: shape.snapped! } : {};
-  return { id: shape.id, label: shape.label, method: shape.method, points: shape.points, texts: shape.texts ?? {}, sigma: String(shape.sigma ?? ""), ...seen, ...found, ...snapped };
+  const outline = isOutline(shape.outline) ? { outline: shape.outline } : {};
+  return { id: shape.id, label: shape.label, method: shape.method, points: shape.points, texts: shape.texts ?? {}, sigma: String(shape.sigma ?? ""), ...seen, ...found, ...snapped, ...outline };
 }
 
 function isNotes(value: unknown): value is Note[] {
@@ -318,6 +359,13 @@ function isFound(value: unknown): value is Found {
   const named = (text: unknown) => text === null || isText(text);
   const tilt = found.tilt === null || (typeof found.tilt === "object" && !Array.isArray(found.tilt));
   return named(found.text) && named(found.target) && tilt && Array.isArray(found.others) && found.others.every((name) => isText(name)) && isNotes(found.notes);
+}
+
+function isOutline(value: unknown): value is OutlineOf {
+  const outline = value as Partial<OutlineOf> | null;
+  if (!outline || typeof outline !== "object" || !isText(outline.field) || !Array.isArray(outline.contour) || outline.contour.length > 5000) return false;
+  const extents = Object.values(outline.extents ?? {}) as (Partial<Seen> | null)[];
+  return outline.contour.every(isPoint) && extents.every((seen) => seen !== null && Array.isArray(seen?.points_px) && seen.points_px.every(isPoint));
 }
 
 function isSnapped(value: unknown): value is Record<string, Snapped> {
