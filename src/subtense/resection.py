@@ -27,7 +27,7 @@ from .observation import Observation
 STEPS = 3
 """Steps of moved numbers from the nominal solution."""
 MOST_STEPS = 100
-FIRST_STEPS = 12
+FIRST_STEPS = 6
 SETTLED = 1e-9
 """Relative fall of the squared sum below which the nominal solution has converged."""
 STARTS = (1.0, 0.7, 1.4, 0.5, 2.0)

@@ -1,7 +1,8 @@
 """How often the 95 % interval on the ground holds the truth: scenes with exact truth, noise of the stated law on everything.
 
-1,000 scenes a geometry must give 92.6 to 97.1 %, 300 must give 90.3 to 98.7 % (binomial, 0.1 % two-sided), and neither side may
-have more than 4.6 % or 6 % of misses; benchmarks/ground.py has 5,000, for 93.96 to 95.98 %, and 1.8 to 3.3 % on each side.
+1,000 scenes a geometry must give 92.6 to 97.1 %, 300 must give 90.3 to 98.7 %, 150 must give 88 to 99.4 % (binomial, 0.1 %
+two-sided), and neither side may have more than 4.6, 6 or 7.4 % of misses; benchmarks/ground.py has 5,000, for 93.96 to 95.98 %,
+and 1.8 to 3.3 % on each side.
 """
 
 import math
@@ -22,9 +23,9 @@ from subtense.observation import Observation
 from subtense.quantity import Quantity
 from subtense.target import Target
 
-SCENES, FEWER = 1000, 300
-BOUNDS = {SCENES: (0.926, 0.971), FEWER: (0.903, 0.987)}
-MOST_ON_ONE_SIDE = {SCENES: 0.046, FEWER: 0.060}
+SCENES, FEWER, FEWEST = 1000, 300, 150
+BOUNDS = {SCENES: (0.926, 0.971), FEWER: (0.903, 0.987), FEWEST: (0.880, 0.994)}
+MOST_ON_ONE_SIDE = {SCENES: 0.046, FEWER: 0.060, FEWEST: 0.074}
 WIDTH, HEIGHT = 1600, 1200
 EARTH_M = 6_371_000.0
 U_CAMERA = np.array([0.01 * 1500, 0.0, 4.0, 4.0, 0.005, 0, 0, 0, 0])
@@ -205,7 +206,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say(name):
 
 
 @pytest.mark.parametrize(
-    "name", [n for n in MADE if n.split()[0] not in ("surveyed", "point") or n.endswith(("far", "nadir"))]
+    "name",
+    ["point far", "point nadir", "horizon bad", "length typical", "length nadir", "speed good", "sampling nadir"],
 )
 def test_intervals_of_other_views_and_lengths(name):
     check(*score(name, FEWER)[:2])
@@ -214,7 +216,7 @@ def test_intervals_of_other_views_and_lengths(name):
 @pytest.mark.opencv
 @pytest.mark.parametrize("name", [n for n in MADE if n.startswith("surveyed")])
 def test_intervals_beside_surveyed_points(name):
-    check(*score(name, FEWER)[:2])
+    check(*score(name, FEWEST)[:2])
 
 
 def check(hit, below):
