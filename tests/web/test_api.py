@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from jsonschema import Draft202012Validator
-from PIL import Image
+from PIL import Image, ImageFilter
 from running import picture, serving, until
 from test_decode import dng, heic
 
@@ -522,6 +522,18 @@ def test_a_line_in_a_photo_is_what_the_command_line_prints(server, examples):
     assert server.client.post("/api/measure/known_size", json=body).json() == printed(*words, "--camera", "f=1500px")
     body["inputs"]["ends"] = "500,600;9000,600"
     assert error(server.client.post("/api/measure/known_size", json=body))["name"] == "ends"
+
+
+def test_points_set_on_a_blurred_picture_are_doubted_as_the_command_doubts_them(server, examples, tmp_path):
+    with Image.open(examples / "desk.jpg") as sharp:
+        exif = sharp.info["exif"]
+        sharp.filter(ImageFilter.GaussianBlur(6)).save(tmp_path / "blurred.jpg", quality=95, exif=exif)
+    held = server.photo((tmp_path / "blurred.jpg").read_bytes(), "blurred.jpg")
+    line = "346,600,753,600"
+    body = {"photo": held["id"], "inputs": {"ends": "346,600;753,600", "size": "260"}}
+    found = server.client.post("/api/measure/known_size", json=body).json()
+    assert "blurred" in [note["code"] for note in found["measurements"][0]["notes"]]
+    assert found == printed("measure", tmp_path / "blurred.jpg", "--line", line, "--size", "260")
 
 
 OBSERVED = ("points_px", "sigma_px", "cov", "label", "score", "source")

@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
-from ..detection import parse_curve, unknown_curve
+from ..detection import Detection, parse_curve, unknown_curve
 from ..detectors.markers import FAMILIES
 from ..errors import InputError, UnknownCameraError
 from ..observation import Observation
@@ -21,6 +21,7 @@ from ..quantity import Note
 from ..targets import find_target
 from ..workflow.calculator_of import calculator_of
 from ..workflow.detect import detectors_for
+from ..workflow.grade import graded
 from ..workflow.in_photo import Item, measure_item, measure_items
 from ..workflow.measure import camera_document, no_camera_document
 from ..workflow.snap import snapped
@@ -179,7 +180,7 @@ def _known(camera: Any) -> Any:
 def post_sheet(request: Request, body: models.Sheet, form: Format = "json") -> Response:
     """An item that has no answer becomes a note `refused`, and does not lose the others."""
     photo = held(request, body.photo)
-    items = [Item(_method(one.method), one.inputs, one.label, _notes(one.notes)) for one in body.items]
+    items = [Item(_method(one.method), one.inputs, one.label, _notes(one.notes), judged=True) for one in body.items]
     document = measure_items(
         items, photo.photo, camera_for(state_of(request), photo, body.camera), level=body.level, seed=body.seed
     )
@@ -193,7 +194,7 @@ def post_measure(request: Request, method: Annotated[str, InPath(max_length=100)
     """Inputs as GET /api/methods describes them. With a photo its camera is filled in, and points must lie in it."""
     photo = held(request, body.photo) if body.photo else None
     camera = camera_for(state_of(request), photo, body.camera) if photo else None
-    item = Item(_method(method), body.inputs, body.label, _notes(body.notes))
+    item = Item(_method(method), body.inputs, body.label, _notes(body.notes), judged=True)
     document = measure_item(item, photo.photo if photo else None, camera, level=body.level, seed=body.seed)
     return shown(document, form, photo.photo if photo else None)
 
@@ -285,6 +286,10 @@ def post_snap(request: Request, body: models.Snap) -> Response:
     except InputError as error:
         raise InputError("curve", error.given, error.allowed) from None
     found, notes = snapped(photo.photo, marked, curve, radius_px=body.radius_px)
+    shape = {2: "length", 4: "rectangle"}.get(len(body.points_px))
+    if shape is not None:
+        judged = graded(photo.photo, Detection(found, shape))
+        found, notes = judged.seen, (*notes, *judged.notes)
     return JSONResponse({"observation": found.to_json(), "notes": [note.to_json() for note in notes]})
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 from ..arrays import Array
 from ..detection import Detection
@@ -13,6 +14,8 @@ from ..quantity import Note
 
 OPEN = ("length",)
 """Shapes whose points do not go round them."""
+CLICKED = ("assumed: a clicked", "clicked", "clicks", "stated")
+"""How the source of points that a person set begins."""
 
 
 def graded(photo: Photo, detection: Detection) -> Detection:
@@ -27,6 +30,23 @@ def graded_line(photo: Photo, line: Observation) -> tuple[Observation, tuple[Not
     """The two ends of a line as a person set them: widened where their edges are more blurred than a click's sigma holds."""
     found = quality(photo, line)
     return widened(line, found, clicked=line.cov is None), found.notes
+
+
+def graded_clicks(photo: Photo, inputs: Any) -> tuple[Any, tuple[Note, ...]]:
+    """A method's Inputs with each line and figure that a person set judged as `graded_line` judges a line."""
+    changes: dict[str, Observation] = {}
+    notes: tuple[Note, ...] = ()
+    for field in dataclasses.fields(inputs):
+        seen = getattr(inputs, field.name)
+        if not isinstance(seen, Observation) or seen.cov is not None or not seen.source.startswith(CLICKED):
+            continue
+        if seen.points_px.ndim != 2 or len(seen.points_px) < 2:
+            continue
+        closed = bool(field.metadata.get("closed"))
+        found = quality(photo, seen, closed=closed)
+        changes[field.name] = widened(seen, found, closed=closed, clicked=True)
+        notes = (*notes, *_new(notes, found.notes))
+    return dataclasses.replace(inputs, **changes) if changes else inputs, notes
 
 
 def _new(old: tuple[Note, ...], new: tuple[Note, ...]) -> tuple[Note, ...]:

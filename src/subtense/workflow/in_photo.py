@@ -26,6 +26,7 @@ from ..photo import Photo
 from ..quantity import Measurement, Note, Quantity
 from ..target import Target
 from .given import NAMED, given, noun_types, read_inputs
+from .grade import graded_clicks
 from .improve import improved
 from .resolve_camera import Resolved
 
@@ -42,12 +43,14 @@ class Item:
         inputs: field to JSON of its noun, or to the text a person typed.
         label: its name.
         notes: doubts about what was seen, which go with the measurement.
+        judged: whether points that a person set are judged here by the picture's quality at them.
     """
 
     method: Method
     inputs: Mapping[str, Any]
     label: str = ""
     notes: tuple[Note, ...] = ()
+    judged: bool = False
 
 
 def measure_item(
@@ -67,8 +70,9 @@ def measure_item(
         GeometryError: no finite answer.
     """
     inputs = item_inputs(item, photo, camera)
+    inputs, seen = graded_clicks(photo, inputs) if item.judged and photo is not None else (inputs, ())
     found = propagate.measure(item.method, inputs, level=level, seed=seed, label=item.label, given=given(inputs))
-    doubts = (*found[0].notes, *_distortion_unknown(inputs), *item.notes)
+    doubts = (*found[0].notes, *_distortion_unknown(inputs), *seen, *item.notes)
     headed = [dataclasses.replace(found[0], notes=doubts), *(dataclasses.replace(m, notes=()) for m in found[1:])]
     return _document(photo, camera, _camera_of(inputs), headed, _shapes(item, inputs))
 
