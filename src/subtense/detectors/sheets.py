@@ -293,6 +293,16 @@ def _corner_radius(patch: Patch, corners: Array, i: int, expected: float) -> flo
     return float(n[crossed[0]]) / (math.sqrt(2) - 1)
 
 
+def _kind_unknown(kinds: Sequence[KnownTarget]) -> tuple[Note, ...]:
+    if not kinds:
+        return ()
+    names = ", ".join(kind.name for kind in kinds)
+    text = f"its proportions are those of {names}; shape does not tell size"
+    return (
+        Note("kind_unknown", text, f"say which is there, as with --target {kinds[0].name}, or give width and height"),
+    )
+
+
 def _detection_notes(shape: Outline, fit: KindFit) -> list[Note]:
     notes = []
     hidden = [side.support for side in shape.sides if side.support < HIDDEN]
@@ -318,7 +328,7 @@ def _detection(shape: Outline, fit: KindFit, others: tuple[KnownTarget, ...], *,
     )  # fmt: skip
     if known and others:  # of those told, several fit: none is taken
         others = (fit.target, *others)
-    notes = tuple(_detection_notes(shape, fit))
+    notes = (*_detection_notes(shape, fit), *_kind_unknown(others if not unlike else ()))
     return Detection(seen, "rectangle", fit.target if unlike else None, others, notes=notes)
 
 
