@@ -15,11 +15,13 @@ sys.path.insert(0, str(ROOT / "tests" / "synthetic"))
 sys.path.insert(0, str(ROOT / "tests"))
 
 import calibrations  # noqa: E402
+import sheets  # noqa: E402
 import test_coverage as coverage  # noqa: E402
 import test_real_pictures as real  # noqa: E402
+import test_rim_coverage as rims  # noqa: E402
 
 from subtense import Photo, Quantity, measure_lines, measure_markers, resolve_camera  # noqa: E402
-from subtense.methods import known_distance, known_size, pose, same_plane  # noqa: E402
+from subtense.methods import known_distance, known_size, pose, same_plane, sphere  # noqa: E402
 from subtense.observation import Observation  # noqa: E402
 
 PAGE = ROOT / "docs" / "accuracy.md"
@@ -41,6 +43,8 @@ def simulated() -> list[Row]:
     jobs += [(known_distance.METHOD, coverage.known_distance_scene, kind) for kind in coverage.GEOMETRY]
     jobs += [(same_plane.METHOD, coverage.plane_scene, kind) for kind in coverage.PLANES]
     jobs += [(pose.METHOD, coverage.marker_scene, kind) for kind in ("near", "typical", "tilted")]
+    jobs += [(rims.without_tilt(), rims.disc_scene, kind) for kind in rims.DISCS]
+    jobs += [(sphere.METHOD, rims.ball_scene, kind) for kind in rims.BALLS]
     for method, make, kind in jobs:
         hit, below, _, width, _ = coverage.score(method, make, kind)
         above = 1 - hit.mean(axis=0) - below.mean(axis=0)
@@ -208,6 +212,8 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             put("april_vision", april_vision(Path(folder)))
         put("calibration_real", calibration_real())
+    put("sheets", sheets.rows())
+    put("sheets_rendered", sheets.rendered())
     put("simulated", simulated())
     put("calibration_spread", calibration_spread())
     put("calibration_faults", calibration_faults())

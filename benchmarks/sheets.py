@@ -150,6 +150,7 @@ def _rendered(low: int, high: int, curve: str, count: int) -> Row:
     from subtense.target import Target
 
     target, errors, u, chi2, inside = find_target("a4"), [], [], [], []
+    drawn = 0
     for seed in range(count):
         rng = np.random.default_rng(seed)
         exponent = 2.2 if curve == "told" else float(np.clip(rng.normal(2.2, 0.5), 1.0, 3.4))
@@ -157,6 +158,9 @@ def _rendered(low: int, high: int, curve: str, count: int) -> Row:
             tilt=rng.uniform(low, high), axis=rng.uniform(0, 360), turn=rng.uniform(0, 360), distance_m=rng.uniform(0.6, 1.2),
             blur=rng.uniform(0.5, 1.6), noise=rng.uniform(1, 6), exponent=exponent, seed=seed, dark=rng.uniform(30, 120),
         )  # fmt: skip
+        if np.any(corners < 0) or np.any(corners > [photo.width_px - 1, photo.height_px - 1]):
+            continue  # cut by the border: not to be found
+        drawn += 1
         told = Quantity.exact(2.2, "1") if curve == "told" else unknown_curve()
         seen = [one.seen for one in sheets(photo, Search(targets=(target,), camera=camera, curve=told))]
         if len(seen) != 1:
@@ -168,7 +172,7 @@ def _rendered(low: int, high: int, curve: str, count: int) -> Row:
         known = Target.rectangle(Quantity.exact(0.297, "m"), Quantity.exact(0.210, "m"), "a4")
         m = propagate.measure(pose.METHOD, pose.Inputs(camera, seen[0], known))[0]
         inside.append(m.low < true < m.high)
-    return (f"{low} to {high}°", curve, f"{len(errors)} of {count}", f"{np.sqrt(np.mean(np.square(errors))):.3f} px",
+    return (f"{low} to {high}°", curve, f"{len(errors)} of {drawn}", f"{np.sqrt(np.mean(np.square(errors))):.3f} px",
             f"{np.mean(u):.3f} px", f"{np.mean(chi2):.2f}", f"{100 * np.mean(inside):.0f} %")  # fmt: skip
 
 
