@@ -203,6 +203,22 @@ def _read(pixels: Pixels, at: Array) -> Array:
     return np.asarray((top * (1 - b) + (pixels[y1, x0] * (1 - a) + pixels[y1, x1] * a) * b) / 255.0)
 
 
+def overlap(pixels: Pixels, contour: Contour) -> float:
+    """Share of the pixels beside a contour whose colour is that of its other side, by the best straight cut of colours.
+
+    Source: R. A. Fisher, The use of multiple measurements in taxonomic problems, Annals of Eugenics 7 (1936).
+    """
+    points, normal = contour.points_px, normals_of(smoothed(contour.points_px, 5.0))  # scatter turns normals
+    clear = 2 * contour.blur_px if math.isfinite(contour.blur_px) else 0.0  # of the edge's own blur
+    away = [clear + k for k in (3, 5, 7)]
+    inner, outer = (np.concatenate([_read(pixels, points + way * k * normal) for k in away]) for way in (-1, 1))
+    spread = (np.cov(inner.T) + np.cov(outer.T)) / 2 + 1e-5 * np.eye(3)
+    cut = np.linalg.solve(spread, inner.mean(axis=0) - outer.mean(axis=0))
+    a, b = inner @ cut, outer @ cut
+    between = (a.mean() + b.mean()) / 2
+    return float(np.mean(a < between) + np.mean(b > between)) / 2
+
+
 # -- extents ------------------------------------------------------------------------------------------
 
 
@@ -279,29 +295,34 @@ def angles_of(contour: Contour) -> dict[str, float]:
             "height": math.pi / 2}  # fmt: skip
 
 
-def extents_of(contour: Contour, others: Sequence[Contour]) -> dict[str, Observation]:
+def extents_of(contour: Contour, others: Sequence[Contour], mixed_px: float = 0.0) -> dict[str, Observation]:
     """The ends of each extent, and the corners of the narrowest box, with their covariance.
 
     Args:
         contour: the outline.
         others: outlines of the same thing by other runs of the segmentation.
+        mixed_px: further u of each side, where thing and ground have the same colours.
     """
     found = {}
     angles = angles_of(contour)
     for name, angle in angles.items():
-        found[name] = _ends(contour, others, angle, name)
-    found["box"] = _box(contour, others, angles["shortest"])
+        found[name] = _ends(contour, others, angle, mixed_px, name)
+    found["box"] = _box(contour, others, angles["shortest"], mixed_px)
     return found
 
 
-def _sides(contour: Contour, others: Sequence[Contour], angle: float) -> tuple[_Touch, _Touch, float, float]:
+def _sides(
+    contour: Contour, others: Sequence[Contour], angle: float, mixed: float
+) -> tuple[_Touch, _Touch, float, float]:
     """The touching lines and u of each, but for what moves all edges together."""
     far, near = calliper(contour, angle)
     again = [calliper(other, angle) for other in others] or [(far, near)]
     spread = [
         math.sqrt(float(np.mean([(one[k].height - (far, near)[k].height) ** 2 for one in again]))) for k in (0, 1)
     ]
-    u_far, u_near = (math.sqrt(side.u**2 + spread[k] ** 2 + EDGE_SIGMA_PX**2) for k, side in enumerate((far, near)))
+    u_far, u_near = (
+        math.sqrt(side.u**2 + spread[k] ** 2 + EDGE_SIGMA_PX**2 + mixed**2) for k, side in enumerate((far, near))
+    )
     return far, near, u_far, u_near
 
 
@@ -311,10 +332,10 @@ def together_px(contour: Contour) -> float:
     return 0.6 * CURVE_U * math.hypot(blur, PIXEL_BLUR)
 
 
-def _ends(contour: Contour, others: Sequence[Contour], angle: float, name: str) -> Observation:
+def _ends(contour: Contour, others: Sequence[Contour], angle: float, mixed: float, name: str) -> Observation:
     d = np.array([math.cos(angle), math.sin(angle)])
     e = np.array([-d[1], d[0]])
-    far, near, u_far, u_near = _sides(contour, others, angle)
+    far, near, u_far, u_near = _sides(contour, others, angle, mixed)
     across = float((far.place + near.place) @ e) / 2
     ends = np.array([-near.height * d + across * e, far.height * d + across * e])
     cov = np.zeros((4, 4))
@@ -325,12 +346,12 @@ def _ends(contour: Contour, others: Sequence[Contour], angle: float, name: str) 
     return Observation(ends, cov=cov + np.outer(out, out), label=name, source="outline")
 
 
-def _box(contour: Contour, others: Sequence[Contour], angle: float) -> Observation:
+def _box(contour: Contour, others: Sequence[Contour], angle: float, mixed: float) -> Observation:
     """Corners of the box whose shorter side lies in a direction, in order around."""
     d = np.array([math.cos(angle), math.sin(angle)])
     e = np.array([-d[1], d[0]])
-    far, near, u_far, u_near = _sides(contour, others, angle)
-    right, left, u_right, u_left = _sides(contour, others, angle + math.pi / 2)
+    far, near, u_far, u_near = _sides(contour, others, angle, mixed)
+    right, left, u_right, u_left = _sides(contour, others, angle + math.pi / 2, mixed)
     a, b = (-near.height, far.height), (-left.height, right.height)
     order = ((0, 0), (1, 0), (1, 1), (0, 1))
     corners = np.array([a[i] * d + b[j] * e for i, j in order])
