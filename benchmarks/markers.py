@@ -56,7 +56,9 @@ def seen_corners(case: Case, rng: np.random.Generator, size: int) -> np.ndarray:
     return points[:, :2] / points[:, 2:] * FOCAL_PX + (size - 1) / 2 + rng.uniform(-0.5, 0.5, 2)
 
 
-def drawn(case: Case, number: int, rng: np.random.Generator, blurred_in: str = "light") -> tuple[np.ndarray, np.ndarray]:
+def drawn(
+    case: Case, number: int, rng: np.random.Generator, blurred_in: str = "light"
+) -> tuple[np.ndarray, np.ndarray]:
     """A picture (uint8) of one marker and its true corners."""
     size = int(case.side_px * 2.2) + 40
     corners = seen_corners(case, rng, size)

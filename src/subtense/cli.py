@@ -191,43 +191,133 @@ def convert(source: str, target: Path, from_form: str | None, to_form: str | Non
         click.echo(f"note: {_one_line(lost)}", err=True)
 
 
-@main.command(epilog="Example: subtense measure examples/desk.jpg --marker-size '50 mm' --overlay out.png")
+def _search_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """What to look for: the same for `measure` and `detect`."""
+    for option in (
+        click.option("--thorough", is_flag=True, help="Look for small things even where larger ones are found."),
+        click.option("--model", type=click.Path(path_type=Path), metavar="FILE",
+                     help="Find objects with this ONNX network of the YOLO or DETR family instead."),
+        click.option("--curve", metavar="CURVE", help="From light to the picture's values: srgb, linear, or an exponent."
+                     "  [default: near srgb]"),
+        click.option("--marker-family", "family", metavar="NAME", help="Of markers, look for this family only, as 36h11 or 4x4."),
+        click.option("--target-file", type=click.Path(path_type=Path), metavar="FILE",
+                     help="More things of known size, from a TOML file of your own."),
+        click.option("--target", "targets", multiple=True, metavar="NAME",
+                     help="Look for this thing of known size, as a4, euro-1 or person; see `subtense targets`."),
+        click.option("--only", multiple=True, metavar="NAME",
+                     help="Look for markers, qr_codes, faces, objects, sheets or circles only."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+@contextmanager
+def _searching() -> Iterator[Callable[[str, float], None]]:
+    """A bar on the terminal's error stream that says what is looked for; nothing where that is no terminal."""
+    with click.progressbar(length=1000, label="Looking", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
+
+        def told(title: str, share: float) -> None:
+            bar.label = f"Looking for {title}"
+            bar.update(round(1000 * share) - bar.pos)
+
+        yield told
+
+
+@main.command(
+    epilog="Examples: subtense measure examples/desk.jpg --marker-size '50 mm' --overlay out.png; subtense measure street.jpg"
+)
 @click.argument("photo", type=click.Path(path_type=Path))
 @click.option(
     "--line", "lines", multiple=True, metavar="X1,Y1,X2,Y2", help="Two ends of an object, px; may be repeated."
 )
 @click.option(
-    "--size", "sizes", multiple=True, metavar="LENGTH", help="Its real size, mm if bare; one for all lines or one each."
+    "--size",
+    "sizes",
+    multiple=True,
+    metavar="LENGTH",
+    help="Its real size, mm if bare; one for all lines or one each. Without lines, of what is found and nothing else tells.",
 )
+@click.option(
+    "--outline",
+    "outlines",
+    multiple=True,
+    metavar="PLACE",
+    help="Find the outline of what is at X,Y or in the box X1,Y1,X2,Y2, px; --size is that of its --extent.",
+)
+@click.option(
+    "--extent", default="longest", show_default=True, help="Of an outline: longest, shortest, width or height."
+)
+@click.option("--outline-model", metavar="FILE", help="Cut it out with this ONNX network, or one for people: person.")
 @click.option("--tilt", metavar="ANGLE", help='Of the object to the image plane.  [default: "0 ± 20 deg (limits)"]')
+@click.option("--snap", is_flag=True, help="Move the ends of lines to the edges and corners near them.")
 @click.option(
     "--marker-size", metavar="LENGTH", help="Find ArUco and AprilTag markers; side of the black square, mm if bare."
 )
-@click.option("--marker-family", metavar="NAME", help="Look for this family only, as 36h11 or 4x4.")
+@_search_options
 @click.option("--camera", metavar="CAMERA", help='A calibration file, "f=1500px", "f=35mm,sensor=14.1mm", "fov=70deg", or a preset.'
               "  [default: from the photo's metadata]")  # fmt: skip
 @click.option("--overlay", type=click.Path(path_type=Path), help="Write the photo with the result drawn on it.")
 @_output_options
-def measure(photo: Path, lines: tuple[str, ...], sizes: tuple[str, ...], tilt: str | None, marker_size: str | None,
-            marker_family: str | None, camera: str | None, overlay: Path | None, form: str, files: tuple[Path, ...],
-            level: float, seed: int) -> None:  # fmt: skip
-    """Measure in PHOTO: objects of known size by their ends, or markers by themselves.
+def measure(photo: Path, lines: tuple[str, ...], sizes: tuple[str, ...], outlines: tuple[str, ...], extent: str,
+            outline_model: str | None, tilt: str | None, snap: bool, marker_size: str | None, camera: str | None,
+            overlay: Path | None, form: str, files: tuple[Path, ...], level: float, seed: int, **told: Any) -> None:  # fmt: skip
+    """Measure in PHOTO: objects of known size by their ends, or everything that is found by itself.
 
-    Pixel (0, 0) is the centre of the top-left pixel of the upright picture.
+    Without --line or --outline it looks for markers, QR codes, sheets, faces, people, vehicles and more, and lists
+    each with its distance and what its size is taken to be. Pixel (0, 0) is the centre of the top-left pixel of the
+    upright picture.
     """
     from .photo import Photo
-    from .workflow.measure_input import measure_document
+    from .workflow.found import Asked
+    from .workflow.measure_input import gray_will_do, measure_document
     from .workflow.report_of import report_of
 
     report_of(form)
-    picture = Photo.load(photo)
-    document = measure_document(picture, lines=lines, sizes=sizes, tilt=tilt, marker_size=marker_size,
-                                marker_family=marker_family, camera=camera, level=level, seed=seed)  # fmt: skip
+    asked = Asked(**told)
+    shown = overlay is not None or bool(files) or bool(outlines)
+    picture = Photo.load(photo, gray=not shown and gray_will_do(asked, marker_size, lines))
+    if outlines:
+        from .workflow.outline import outline_document
+
+        document = outline_document(picture, outlines, sizes, extent=extent, model=outline_model, tilt=tilt, camera=camera,
+                                    level=level, seed=seed, beside=bool(lines or marker_size))  # fmt: skip
+    else:
+        with _searching() as progress:
+            document = measure_document(picture, lines=lines, sizes=sizes, tilt=tilt, snap=snap, marker_size=marker_size,
+                                        asked=asked, camera=camera, level=level, seed=seed, progress=progress)  # fmt: skip
     if overlay is not None:
         from .reports.overlay import write
 
         write(document, picture, overlay)
     _show(document, form, files, picture)
+
+
+@main.command(epilog="Example: subtense detect examples/desk.jpg --only markers --overlay seen.png")
+@click.argument("photo", type=click.Path(path_type=Path))
+@_search_options
+@click.option(
+    "--camera",
+    metavar="CAMERA",
+    help="What is known of the camera; it tells shapes apart. See `subtense measure --help`.",
+)
+@click.option("--overlay", type=click.Path(path_type=Path), help="Write the photo with what was found drawn on it.")
+@click.option("--format", "form", type=click.Choice(["text", "json", "csv"]), default="text", show_default=True)
+def detect(photo: Path, camera: str | None, overlay: Path | None, form: str, **told: Any) -> None:
+    """What is found in PHOTO by itself: where, how well it is known, and what it is taken to be. Nothing is measured."""
+    from .photo import Photo
+    from .reports import detections as shown
+    from .workflow.detect import detection_json, shapes_of
+    from .workflow.found import Asked, found_in
+
+    picture = Photo.load(photo)
+    with _searching() as progress:
+        found = found_in(picture, Asked(**told), camera, progress)
+    if overlay is not None:
+        from .reports.overlay import write
+
+        write(shapes_of(found, picture), picture, overlay)
+    rows = [detection_json(one) for one in found.detections]
+    click.echo(getattr(shown, form)(rows, picture, found.notes))
 
 
 @main.command(epilog="Example: subtense serve examples/desk.jpg")

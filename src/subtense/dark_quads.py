@@ -30,7 +30,9 @@ def dark_quads(gray: Pixels, smallest_px: float) -> list[Array]:
     for window in WINDOWS_PX:
         if window > min(gray.shape):
             break
-        binary = cv2.adaptiveThreshold(gray, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, LEAST_CONTRAST)
+        binary = cv2.adaptiveThreshold(
+            gray, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY_INV, window, LEAST_CONTRAST
+        )
         outlines, _ = cv2.findContours(binary, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
         for outline in outlines:
             if len(outline) >= 3.4 * smallest_px and (quad := _quad(cv2, outline, smallest_px)) is not None:

@@ -22,8 +22,8 @@ FAMILIES: dict[str, tuple[str, int]] = {
 }  # fmt: skip
 """Family: OpenCV's name, and cells across its black square. Earlier families win where a marker reads in two. OpenCV's
 dictionaries of 50, 100 and 250 are the first markers of those of 1000."""
-WEAK = ("16h5", "4x4")
-"""Families of 16 bits: every 16th dark square reads as one of their markers."""
+WEAK = ("16h5", "aruco_original", "4x4")
+"""Families of which every 16th dark square reads as a marker, or a dark square with a stripe."""
 BORDER_SEEN = 0.85
 """Share of the border's cells that must read dark."""
 BORDER_GUESSED = 0.6
@@ -32,6 +32,7 @@ LEAST_CONTRAST = 12
 """Of the ring around a marker over its border, encoded values of 255."""
 FINE_CELL_PX = 4.5
 """Cells narrower than this are read through the blur."""
+CONJUGATE_STEPS = 12
 READING_BLUR_PX = 0.9
 """Radius of the blur that is assumed in reading."""
 
@@ -66,6 +67,27 @@ def codes(family: str) -> Array:
 
 
 @cache
+def _numbers(family: str) -> tuple[Array, dict[int, int]]:
+    """(4 markers,) the codes as whole numbers, marker by marker and turn by turn; and where each stands."""
+    known = codes(family)
+    numbers = _number(known.reshape(-1, known.shape[2] * known.shape[3]))
+    places: dict[int, int] = {}
+    for place, number in enumerate(numbers.tolist()):
+        places.setdefault(number, place)
+    return numbers, places
+
+
+def _number(bits: Array) -> Array:
+    """(...) whole numbers of (..., bits)."""
+    return np.asarray(bits.astype(np.uint64) @ (np.uint64(1) << np.arange(bits.shape[-1], dtype=np.uint64)))
+
+
+def _ones(numbers: Array) -> Array:
+    """How many bits of whole numbers are 1."""
+    return np.unpackbits(np.ascontiguousarray(numbers)[:, None].view(np.uint8), axis=1).sum(axis=1)
+
+
+@cache
 def _corrected(family: str) -> int:
     """How many wrong bits its distance would let one correct."""
     import cv2
@@ -79,7 +101,7 @@ def cells_of(family: str, number: int) -> Array:
 
 
 def rimmed(gray: Pixels, quads: list[Array]) -> list[Array]:
-    """Those of the quadrilaterals that are darker along their sides within than without, as every marker is."""
+    """Those of the quadrilaterals that are darker along their sides within than without, as markers are; clearest first."""
     import cv2
 
     if not quads:
@@ -96,8 +118,8 @@ def rimmed(gray: Pixels, quads: list[Array]) -> list[Array]:
     within = np.tile(b >= 0, 4)
     dark, light = np.median(seen[:, within], axis=1), np.median(seen[:, ~within], axis=1)
     darker = np.mean(seen[:, within] < ((dark + light) / 2)[:, None], axis=1)
-    kept = (light - dark >= LEAST_CONTRAST / 2) & (darker >= BORDER_GUESSED)
-    return [quad for quad, keep in zip(quads, kept, strict=True) if keep]
+    rank = np.where((light - dark >= LEAST_CONTRAST / 2) & (darker >= BORDER_GUESSED), light - dark, 0.0)
+    return [quads[i] for i in np.argsort(-rank, kind="stable") if rank[i] > 0]
 
 
 class Reader:
@@ -129,13 +151,17 @@ class Reader:
         seen = self._sampled[size, fine]
         if seen is None:
             return None
-        known = codes(family)
-        wrong = np.count_nonzero(known != seen, axis=(2, 3))
-        number, turns = divmod(int(np.argmin(wrong)), 4)
-        least = int(wrong[number, turns])
-        if least > int(correct * _corrected(family)):
+        numbers, places = _numbers(family)
+        number = _number(seen.ravel())
+        place = places.get(int(number))
+        if place is not None:
+            return Reading(family, *divmod(place, 4), 0)
+        most = int(correct * _corrected(family))
+        if most == 0:
             return None
-        return Reading(family, number, turns, least)
+        wrong = _ones(numbers ^ number)
+        place = int(np.argmin(wrong))
+        return Reading(family, *divmod(place, 4), int(wrong[place])) if wrong[place] <= most else None
 
 
 def _bits(gray: Pixels, corners: Array, size: int, *, fine: bool) -> Array | None:
@@ -212,5 +238,22 @@ def _unblurred(gray: Pixels, corners: Array, size: int) -> Array | None:
     weights = (in_b[:, :, None] * in_a[:, None, :]).reshape(-1, n * n)
     values = gray[yy.ravel()[inside], xx.ravel()[inside]].astype(float)
     middle = values.mean()
-    normal = weights.T @ weights + 0.02 * np.eye(n * n)  # a little towards the mean where pixels can't tell cells apart
-    return np.asarray(np.linalg.solve(normal, weights.T @ (values - middle)) + middle).reshape(n, n)
+    return _damped(weights, values - middle).reshape(n, n) + middle
+
+
+def _damped(weights: Array, values: Array) -> Array:
+    """(cells,) least squares by conjugate gradients, ended early, which leaves what the pixels can't tell near the mean."""
+    x = np.zeros(weights.shape[1])
+    residual = weights.T @ values
+    step, size = residual.copy(), float(residual @ residual)
+    for _ in range(CONJUGATE_STEPS):
+        moved = weights @ step
+        length = float(moved @ moved)
+        if length <= 0:
+            break
+        rate = size / length
+        x += rate * step
+        residual -= rate * (weights.T @ moved)
+        last, size = size, float(residual @ residual)
+        step = residual + size / max(last, 1e-12) * step
+    return x

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Indices
 from .quantity import Quantity
 from .transfer import encoded_of, light_of, slope_of
 
@@ -150,7 +150,7 @@ class _Patch:
         return replace(self, xy=self.xy[::step], value=self.value[::step])
 
 
-def _telling(a: Array, b: Array, n: int, unit: float) -> Array:
+def _telling(a: Array, b: Array, n: int, unit: float) -> Indices:
     """Indices of at most MOST_PIXELS pixels: near the edges first, and some of the plateaus."""
     if len(a) <= MOST_PIXELS:
         return np.arange(len(a))
@@ -225,7 +225,7 @@ def _correlated(patch: _Patch, rho: Array, z_a: Array, phi_a: Array, z_b: Array,
 def _model(patch: _Patch, x: Array) -> tuple[Array, Array]:
     """Encoded values, and their derivatives (k, parameters)."""
     count = len(x) - _OTHERS
-    h, rest = x[:count], x[count:]
+    rest = x[count:]
     place, (a, b, d) = _shares(patch, x)
     value, per_share, others = _encoded(patch, place.share, rest)
     jac = np.empty((len(value), len(x)))
@@ -343,7 +343,7 @@ def _solve(patch: _Patch, x: Array, curve: Quantity, settled_px: float) -> Array
     return x
 
 
-def _free(x: Array, curve: Quantity) -> Array:
+def _free(x: Array, curve: Quantity) -> Indices:
     """Which parameters are free: all, or all but a curve that was told."""
     return np.arange(len(x) - (1 if float(curve.u) < 1e-9 else 0))
 
@@ -392,11 +392,11 @@ def _stray(patch: _Patch, x: Array, residual: Array, sigma: float) -> float:
         ratios.append(pull[telling] ** 2 / (information[telling] * sigma**2))
     found = np.concatenate(ratios)
     chance = 1 + 2 * np.sqrt(2 / len(found))  # what the mean of so many may come to by noise alone
-    return max(float(np.sum(found)) / max(len(found) - 8, 1) / chance, 1.0)
+    return max(float(np.sum(found) / max(len(found) - 8, 1) / chance), 1.0)
 
 
 def _normal(
-    jac: Array, residual: Array, weight: Array, x: Array, free: Array, curve: Quantity, sigma: float | None = None
+    jac: Array, residual: Array, weight: Array, x: Array, free: Indices, curve: Quantity, sigma: float | None = None
 ) -> tuple[Array, Array]:  # fmt: skip
     """The normal equations; their noise is the residuals' where none is given."""
     variance = float(residual**2 @ weight / weight.sum()) if sigma is None else sigma**2
@@ -451,4 +451,4 @@ def _corners(h: Array, bends: bool) -> Array | None:
         if bends:
             a, b = _cell_places(h, places, bends=True)[:2]
             wanted = wanted + square - np.stack([a, b], -1)
-    return places
+    return np.asarray(places)

@@ -31,7 +31,7 @@ def light_of(encoded: Array, exponent: float) -> Array:
     power, offset, end, light = _shape(exponent)
     v = np.maximum(np.asarray(encoded, float), 0.0)
     curved = ((v + offset) / (1 + offset)) ** power
-    return curved if end == 0 else np.where(v > end, curved, v * (light / end))
+    return np.asarray(curved if end == 0 else np.where(v > end, curved, v * (light / end)))
 
 
 def encoded_of(light: Array, exponent: float) -> Array:
@@ -39,7 +39,7 @@ def encoded_of(light: Array, exponent: float) -> Array:
     power, offset, end, least = _shape(exponent)
     x = np.maximum(np.asarray(light, float), 0.0)
     curved = (1 + offset) * x ** (1 / power) - offset
-    return curved if end == 0 else np.where(x > least, curved, x * (end / least))
+    return np.asarray(curved if end == 0 else np.where(x > least, curved, x * (end / least)))
 
 
 def slope_of(encoded: Array, exponent: float) -> Array:

@@ -17,7 +17,7 @@ from ..dark_quads import dark_quads
 from ..detection import Detection, Search
 from ..marker_codes import FAMILIES, WEAK, Reader, Reading, cells_of, rimmed
 from ..observation import Observation
-from ..pattern import fit_pattern
+from ..pattern import Fitted, fit_pattern
 from ..photo import Photo
 from ..quantity import Quantity
 from ..subpixel import refine_quad
@@ -28,9 +28,17 @@ WORST_MISFIT = 0.25
 """Rms residual over contrast beyond which there is no marker."""
 WORST_PATTERN = 0.12
 """The same of a whole pattern, beyond which only its sides are believed."""
+WORST_WEAK = 0.07
+"""The same where few bits tell."""
+LEAST_WEAK_PX = 10.0
+MOST_READ = 600
+MOST_FINE = 100
+"""Quadrilaterals of a level that are read, and that are read through the blur: those of most contrast."""
 COARSE_PX = 1100
 """Longer side of the level that is searched first."""
 SMALLEST_QUAD_PX = 8.0
+SEEN_FROM_PX = 15.0
+"""Side of a sharp marker from which on it is usually found, in px of the level."""
 MOST_ENLARGED = 2_000_000
 """Pixels of a picture that is searched twice as large as well, where nothing was found."""
 
@@ -61,6 +69,13 @@ def markers(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]
     return tuple(Detection(one, "square") for one in sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))
 
 
+def reach_px(photo: Photo, search: Search, found: bool) -> float:
+    """Side of the smallest marker that the search came down to, px; sharp ones are seen from there on."""
+    levels = _levels(photo.width_px, photo.height_px, thorough=search.thorough)
+    last = levels[0] if found and not search.thorough else levels[-1]
+    return SEEN_FROM_PX / last
+
+
 def _gray(pixels: Pixels) -> Pixels:
     """(H, W) encoded luma."""
     import cv2
@@ -86,10 +101,10 @@ def _on_level(gray: Pixels, scale: float, search: Search) -> list[Observation]:
     else:
         how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
         level = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=how)
-    readers = [(quad, Reader(level, quad)) for quad in rimmed(level, dark_quads(level, SMALLEST_QUAD_PX))]
+    readers = [(quad, Reader(level, quad)) for quad in rimmed(level, dark_quads(level, SMALLEST_QUAD_PX))[:MOST_READ]]
     for correct, fine, families in _passes([search.family] if search.family else list(FAMILIES)):
         found: list[Observation] = []
-        for quad, reader in readers:
+        for quad, reader in readers[:MOST_FINE] if fine else readers:
             read = next((r for r in (reader.read(name, correct, fine=fine) for name in families) if r), None)
             one = read and _located(gray, _turned(_full(quad, scale), read), read, search.curve)
             if one and not _seen(one, found):
@@ -125,12 +140,26 @@ def _located(gray: Pixels, corners: Array, read: Reading, curve: Quantity) -> Ob
     label, rough = f"{read.family} id {read.number}", corners - offset
     cells = cells_of(read.family, read.number)
     pattern = fit_pattern(patch, rough, cells, curve)
-    if pattern is not None and pattern.misfit < WORST_PATTERN:
+    if pattern is not None and _believed(pattern, read, len(cells), curve):
         return Observation(pattern.corners_px + offset, cov=pattern.cov, label=label, source="pattern of the marker")
+    if read.family in WEAK or read.wrong:
+        return None
     quad = refine_quad(patch, rough, float(np.sqrt(_area(rough))) / len(cells), curve)
     if quad is None or quad.misfit >= WORST_MISFIT:
         return None
     return Observation(quad.corners_px + offset, cov=quad.cov, label=label, source="edges of the marker")
+
+
+def _believed(pattern: Fitted, read: Reading, cells: int, curve: Quantity) -> bool:
+    """Whether it looks like this marker: of weak families, which much else reads as, more is asked."""
+    if pattern.misfit >= WORST_PATTERN:
+        return False
+    if read.family not in WEAK:
+        return True
+    sides = np.hypot(*(np.roll(pattern.corners_px, -1, axis=0) - pattern.corners_px).T)
+    usual = abs(pattern.curve - float(curve.value)) <= max(2.5 * float(curve.u), 1e-6)
+    sharp = pattern.blur_px < float(sides.mean()) / cells
+    return usual and sharp and pattern.misfit < WORST_WEAK and bool(sides.min() > max(0.2 * sides.max(), LEAST_WEAK_PX))
 
 
 def _patch(gray: Pixels, corners: Array) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..detection import Detection, Search
+from ..document import Document, Shape
 from ..errors import InputError, MissingExtraError, UnknownCameraError
 from ..photo import Photo
 from ..quantity import Note, Quantity
@@ -44,6 +45,10 @@ WAYS: dict[str, Way] = {
     "sphere": Way("sphere", "rim", "diameter"),
 }
 """By the shape of a detection."""
+
+
+SEARCHED_FINE_PX = 25.0
+"""Size that a search should reach down to, or it is noted."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +119,10 @@ def detect(
             continue
         found += [graded(photo, one) for one in seen]
         by += [row.name] * len(seen)
+        reach = row.reach(photo, told, bool(seen)) if row.reach else 0.0
+        if reach > SEARCHED_FINE_PX and seen:
+            text = f"{row.title} were looked for down to about {reach:.0f} px; smaller ones were not, as larger ones are there"
+            notes.append(Note("searched_coarse", text, "look for smaller ones too with --thorough"))
     return Found(tuple(_told_apart(found)), tuple(notes), tuple(by))
 
 
@@ -157,14 +166,28 @@ def item_of(detection: Detection, size: Target | Quantity | str | None = None) -
         size: side of a square, or the length or diameter; text as a person types it.
     """
     way = WAYS[detection.shape]
-    text = way.prefix + size if isinstance(size, str) else size
-    told = text if size is not None else size_text(detection)
+    told = way.prefix + size if isinstance(size, str) else size
+    if told is None:
+        told = _size_of(detection)
     if told is None:
         return None
+    if isinstance(told, Quantity) and way.size == "target":
+        told = Target.square(told, detection.label)
     inputs: dict[str, Any] = {way.points: detection.seen, way.size: told}
     if detection.tilt is not None and detection.shape == "length":
         inputs["tilt"] = detection.tilt
     return Item(METHODS[way.method], inputs, detection.label)
+
+
+def _size_of(detection: Detection) -> Target | Quantity | None:
+    """The size of what it is taken to be, with where that comes from."""
+    known = detection.target
+    if known is None:
+        return None
+    if known.width is not None and known.height is not None:
+        return Target.rectangle(known.width, known.height, known.title)
+    assert known.size is not None
+    return Target.square(known.size, known.title) if detection.shape == "square" else known.size
 
 
 def detection_json(detection: Detection) -> dict[str, Any]:
@@ -174,3 +197,12 @@ def detection_json(detection: Detection) -> dict[str, Any]:
         **detection.to_json(), "method": way.method, "points_field": way.points, "size_field": way.size,
         "size_prefix": way.prefix, "size_text": size_text(detection),
     }  # fmt: skip
+
+
+def shapes_of(found: Found, photo: Photo) -> Document:
+    """A document without measurements, whose shapes are what was found: for drawing."""
+    shapes = tuple(
+        Shape(tuple((float(x), float(y)) for x, y in one.seen.points_px), one.shape != "length", one.label)
+        for one in found.detections
+    )
+    return Document((), None, photo.to_json(), (*photo.notes, *found.notes), shapes)

@@ -84,7 +84,7 @@ def measure_markers(
     if family is not None and family not in FAMILIES:
         raise InputError("--marker-family", family, f"known are {', '.join(FAMILIES)}")
     resolved = resolve_camera(photo, camera)
-    found = detect(photo, ["markers"], Search(family=family, curve=curve or unknown_curve()))
+    found = detect(photo, ["markers"], Search(family=family, curve=curve or unknown_curve(), camera=resolved.camera))
     if not found.detections:
         raise NothingFoundError(f"{photo.name}: no marker found, one is needed; it must be sharp, whole, with a light border, "
                                 "and at least 15 px wide")  # fmt: skip
@@ -102,7 +102,7 @@ def measure_detections(
         found: by `detect`.
         photo: the picture.
         camera: of it.
-        sizes: by shape or `markers`, for things whose size must be told.
+        sizes: by the name of the detector, or "" for any, of things whose size must be told.
         stated: kinds that a person said are in the picture; the size of others is assumed, which is noted.
         level: coverage of the intervals.
         seed: of the draws.
@@ -111,9 +111,8 @@ def measure_detections(
         A document; what has no answer is a note `refused`, and what has no size a note `size_unknown`.
     """
     documents, notes = [], [*found.notes]
-    for one in found.detections:
-        size = sizes.get("markers" if one.shape == "square" else one.shape) if one.target is None else None
-        item = item_of(one, size)
+    for one, detector in zip(found.detections, found.detectors, strict=True):
+        item = item_of(one, sizes.get(detector, sizes.get("")) if one.target is None else None)
         if item is None:
             notes += [dataclasses.replace(note, text=f"{one.label}: {note.text}") for note in one.notes]
             notes.append(Note("size_unknown", f"{one.label}: found, and nothing tells its size", "give its size"))

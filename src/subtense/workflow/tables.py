@@ -61,6 +61,8 @@ class Detector:
         asks: what a person must say to have it measured; empty where that is nothing.
         automatic: whether `subtense measure PHOTO` looks for it unasked.
         extra: of the package, that it needs; empty for none.
+        reach: size in px down to which a photo was searched, from Photo, Search, and whether anything was found; None
+            where all of it is searched alike.
     """
 
     name: str
@@ -70,18 +72,20 @@ class Detector:
     asks: str = ""
     automatic: bool = True
     extra: str = ""
+    reach: Callable[[Photo, Search, bool], float] | None = None
 
 
 DETECTORS: dict[str, Detector] = {
     d.name: d
     for d in (
-        Detector("markers", "ArUco and AprilTag markers", markers.markers, asks="side of the markers' black square"),
+        Detector("markers", "ArUco and AprilTag markers", markers.markers, asks="side of the markers' black square",
+                 reach=markers.reach_px),
         Detector("qr_codes", "QR codes", qr_codes.qr_codes, asks="side of the code"),
         Detector("faces", "faces, by their eyes", faces.faces, ("body",), extra="networks"),
         Detector("objects", "people, vehicles and household things", objects.objects,
                  ("body", "vehicle", "bottle", "household"), extra="networks"),
         Detector("sheets", "sheets, cards, plates and signs", sheets.sheets, sheets.GROUPS,
-                 asks="which kind a sheet is, or its width and height"),
+                 asks="which kind a sheet is, or its width and height", reach=sheets.reach_px),
         Detector("circles", "coins, balls and round signs", circles.circles, circles.GROUPS,
                  asks="which coin or ball it is, or its diameter", automatic=False),
     )
