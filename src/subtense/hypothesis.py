@@ -15,6 +15,7 @@ from .quantity import Note
 
 if TYPE_CHECKING:
     from .photo import Photo
+    from .told_pose import ToldPose
 
 
 SAME_PROPORTIONS = 0.005
@@ -31,6 +32,7 @@ class Hypothesis:
         reason: how it was had, or why it was not.
         notes: doubts.
         either: where the tags may be read in two ways, a camera for each; `camera` then holds both in its u.
+        pose: how the camera stood, where the source tells it too.
     """
 
     source: str
@@ -38,6 +40,7 @@ class Hypothesis:
     reason: str
     notes: tuple[Note, ...] = ()
     either: tuple[Camera, ...] = ()
+    pose: ToldPose | None = None
 
     @property
     def relative_u(self) -> float:

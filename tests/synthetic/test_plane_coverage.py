@@ -25,7 +25,11 @@ U_CAMERA = np.array([15.0, 0.0, 8.0, 8.0, 0.01, 0, 0, 0, 0])
 FRAME = Observation(np.array([[-0.5, -0.5], [WIDTH - 0.5, HEIGHT - 0.5]]), 0.0, label="picture")
 
 # how much the plane is tilted (degrees), depth in sizes of the reference, how far out the wanted points lie, reference points
-PLANES = {"good": ((20, 50), (2.0, 3.0), 0.6, 9), "typical": ((30, 60), (2.5, 5.0), 1.0, 4), "bad": ((65, 75), (6.0, 9.0), 2.5, 4)}
+PLANES = {
+    "good": ((20, 50), (2.0, 3.0), 0.6, 9),
+    "typical": ((30, 60), (2.5, 5.0), 1.0, 4),
+    "bad": ((65, 75), (6.0, 9.0), 2.5, 4),
+}
 
 
 def cameras(rng):
@@ -127,7 +131,7 @@ def off_plane_scene(kind, rng):
     truth, told, pose, known, points, _ = placed(kind, rng, 0.6, 2)
     side = -np.sign(pose.rotation[:, 2] @ pose.translation_m)  # towards the camera, along the plane's normal
     height = rng.uniform(0.02, 0.2)
-    points = points + [0, 0, side * height]
+    points = [*points, 0, 0, side * height]
     pixels = truth.project(pose.apply(np.concatenate([known, points]))) + rng.normal(0, CLICK_PX, (len(known) + 2, 2))
     n = len(known)
     stated = Quantity.normal(height + 0.02 * rng.standard_normal(), 0.02, "m")
@@ -137,7 +141,7 @@ def off_plane_scene(kind, rng):
 
 
 def distance_scene(kind, rng):
-    truth, told, pose, known, points, pixels = placed(kind, rng, 1.5, 1)
+    _truth, told, pose, known, points, pixels = placed(kind, rng, 1.5, 1)
     seen = pixels + rng.normal(0, CLICK_PX, pixels.shape)
     n = len(known)
     there = pose.apply(points)[0]

@@ -143,7 +143,7 @@ def notes(inputs: Inputs, _: Result) -> tuple[Note, ...]:
                               "give a third line of each direction"))  # fmt: skip
     if camera is None and distortion.source.startswith(ASSUMED):
         found.append(Note("distortion_unknown", "nothing is known of the lens's distortion: "
-                          f"{100 * float(distortion.u):.2g} % (1s) in the corners of the picture is in u", "give a calibrated camera"))  # fmt: skip
+                          f"{100 * float(distortion.u):.2g} % (1s) in the corners is in u", "give a calibrated camera"))  # fmt: skip
     return tuple(found)
 
 
@@ -166,7 +166,7 @@ def example() -> Inputs:
 
 METHOD = Method(
     name="height", title="a height over a plane, by one that is known", inputs=Inputs,
-    outputs=(Output("height_m", "height", "m", "height"), Output("camera_height_m", "camera_height", "m", "height of the camera over the plane")),
+    outputs=(Output("height_m", "height", "m", "height"), Output("camera_height_m", "camera_height", "m", "camera above the plane")),
     function=height,
     assumes=("reference and what is wanted stand upright on one level plane", "the vertical lines are upright, the level lines level",
              "the lens draws as the camera says, or, without one, with the distortion that is in the interval"),

@@ -171,7 +171,7 @@ def example() -> Inputs:
 METHOD = Method(
     name="plane_distance", title="distance to a point in a plane with four known points", inputs=Inputs,
     outputs=(Output("range_m", "range", "m", "range (from the entrance pupil)"), Output("depth_m", "depth", "m", "depth (along the axis)"),
-             Output("camera_height_m", "height", "m", "height of the camera over the plane")),
+             Output("camera_height_m", "camera_height", "m", "camera above the plane")),
     function=plane_distance,
     assumes=("the reference points have the places that are stated, and lie in one plane", "the point lies in that plane",
              "the picture is not cropped or edited after the camera's numbers were taken"),

@@ -136,7 +136,8 @@ def example() -> Inputs:
         return Observation(camera.project((np.array(points) - [0, 0, 1.6]) @ turn.T), 0.7, label=label)
 
     return Inputs(
-        camera, seen((-1.5, 5, 0.2), (-1.5, 5, 2.2), (1.5, 6.5, 0.2), (1.5, 6.5, 2.6), (0.2, 6, 0.3), (0.2, 6, 2.3), label="vertical lines"),
+        camera,
+        seen((-1.5, 5, 0.2), (-1.5, 5, 2.2), (1.5, 6.5, 0.2), (1.5, 6.5, 2.6), (0.2, 6, 0.3), (0.2, 6, 2.3), label="vertical lines"),
         seen((-1, 4.5, 0), (-1, 4.5, 2.0), label="reference"), Quantity.normal(2.0, 0.005, "m"),
         seen((-1.5, 5, 0), (1.5, 6.5, 0), label="foot"), seen((-0.5, 5.5, 1.0), (0.5733, 6.03665, 1.9), label="what is wanted"),
     )  # fmt: skip

@@ -25,6 +25,7 @@ from ..camera_sources import (
     pix4d_tags,
     sensor_database,
     typed,
+    vanishing_points,
 )
 from ..edited import refusal
 from ..errors import InputError, UnknownCameraError
@@ -125,7 +126,7 @@ def resolve_camera(
         camera, lens_notes = _with_lens(camera, hypotheses)
     refused = tuple(n for h in hypotheses if h.camera is None for n in h.notes)
     notes = dict.fromkeys((*photo.notes, *chosen.notes, *(() if given else refused), *lens_notes, *disagreement))
-    return Resolved(camera, chosen, tuple(hypotheses), tuple(notes), told_pose(photo))
+    return Resolved(camera, chosen, tuple(hypotheses), tuple(notes), chosen.pose or told_pose(photo))
 
 
 def _asked(photo: Photo, *, ask_all: bool, given: bool) -> list[Hypothesis]:
@@ -216,6 +217,8 @@ def _given(text: str | SentFile, photo: Photo, *, paths: bool) -> Hypothesis:
         return calibration_file.camera(sent, photo, text.content, pick)
     if not text.strip():
         raise InputError("--camera", text, WHAT_TO_GIVE)
+    if text.split("=")[0].strip() == "lines":
+        return vanishing_points.camera(text, photo, paths=paths)
     if not paths:
         return typed.camera(text, photo)
     path, pick = selector.split(text)
