@@ -4,6 +4,7 @@ Blur 0.5 to 2 px in linear light, noise of 2 to 8 of 255, tilts to 70 degrees, 1
 gives what docs/circles.md prints.
 """
 
+import dataclasses
 import sys
 from pathlib import Path
 
@@ -32,7 +33,7 @@ CASES = (
 """Shape, diameter in px, tilt in degrees, blur in px."""
 
 
-def scene(shape, size, tilts, blurs, rng):
+def scene(size, tilts, blurs, rng):
     """Picture, true middle and what the method gives."""
     radius, exponent = 0.05, 2.2
     depth = 2 * radius * CAMERA.f_px / size
@@ -50,8 +51,6 @@ def measured(found, shape):
     method = circle if shape == "disc" else sphere
     inputs = method.Inputs(CAMERA, found.seen, Quantity.exact(0.1, "m"))
     one = method.METHOD.outputs[:1]
-    import dataclasses
-
     return propagate.measure(dataclasses.replace(method.METHOD, outputs=one), inputs, draws=20_000)[0]
 
 
@@ -62,7 +61,7 @@ def rendered(scenes: int = 24) -> list[Row]:
         rng = np.random.default_rng(size)
         errors, z, hits, found = [], [], 0, 0
         for _ in range(scenes):
-            middle, pixels = scene(shape, size, tilts, blurs, rng)
+            middle, pixels = scene(size, tilts, blurs, rng)
             kind = "tennis-ball" if shape == "ball" else "euro-1"
             seen = circles(photo_of(pixels), Search(targets=(find_target(kind),), curve=TOLD))
             seen = [
@@ -73,9 +72,7 @@ def rendered(scenes: int = 24) -> list[Row]:
             if not seen:
                 continue
             if shape == "disc":  # without the thickness of a coin, which was not drawn
-                seen = [
-                    d for d in circles(photo_of(pixels), Search(targets=(find_target("speed-limit-de"),), curve=TOLD))
-                ]
+                seen = list(circles(photo_of(pixels), Search(targets=(find_target("speed-limit-de"),), curve=TOLD)))
             found += 1
             m, true = measured(seen[0], shape), float(np.linalg.norm(middle))
             errors.append(m.value / true - 1)

@@ -137,12 +137,17 @@ def _off(state: _State, local: Array, size: Array) -> Array:
 
 def _jacobian(state: _State, local: Array, size: Array, count: int) -> Array:
     """(..., N, count) derivatives of the residuals over the size, by differences."""
-    columns, step = [], 1e-5
-    for move in step * np.eye(count):
-        wide = np.broadcast_to(move, (*state.log_size.shape, count))
-        sides = [_off(_moved(state, sign * wide, size), local, size) for sign in (1.0, -1.0)]
-        columns.append((sides[0] - sides[1]) / (2 * step))
-    return np.nan_to_num(np.stack(columns, -1))
+    seen, h = _placed(local, state.turn), 1e-5
+    x, y = seen[..., 0], seen[..., 1]
+    turns = size[..., None, None] * np.stack([np.stack([-x * y, -1 - y * y], -1), np.stack([1 + x * x, x * y], -1)])
+    columns = [
+        residuals(seen + h * turn, state.log_size, state.flat) - residuals(seen - h * turn, state.log_size, state.flat)
+        for turn in turns
+    ]
+    for move in h * np.eye(3)[: count - 2]:
+        sides = [residuals(seen, state.log_size + s * move[0], state.flat + s * move[1:]) for s in (1, -1)]
+        columns.append(sides[0] - sides[1])
+    return np.nan_to_num(np.stack(columns, -1) / (2 * h * size[..., None, None]))
 
 
 def rim_cone(camera: Camera, rim: Observation, *, round_one: bool = False) -> ConeFit:

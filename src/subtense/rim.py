@@ -388,5 +388,7 @@ def _together(off: Array, good: Bools) -> float:
     r = float(
         np.sum(off[pair] * np.roll(off, 1)[pair]) / max(float(np.sum(off[good] ** 2)) * pair.sum() / good.sum(), 1e-12)
     )
-    r = min(max(r, 0.0), 0.8)
+    if r < 2 / float(pair.sum()) ** 0.5:  # no more than chance
+        return 1.0
+    r = min(r, 0.8)
     return (1 + r) / (1 - r)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_coverage import FEWER, SCENES, cameras, check, score
+from test_coverage import cameras, score
 
 from subtense.geometry import Pose, rotation_from_vector
 from subtense.methods import circle, sphere
@@ -82,13 +82,19 @@ def without_tilt():
     return replace(circle.METHOD, outputs=circle.METHOD.outputs[:2])
 
 
-@pytest.mark.parametrize("kind", DISCS)
-def test_discs(kind):
-    hit, below, _, width, error = score(without_tilt(), disc_scene, kind, SCENES if kind == "typical" else FEWER)
-    check(hit, below, width, error)
+FEW = 80
+"""Scenes of a geometry here; benchmarks/accuracy.py has 1,000. The share that holds the truth is then 0.86 or more (0.1 %)."""
 
 
-@pytest.mark.parametrize("kind", BALLS)
-def test_balls(kind):
-    hit, below, _, width, error = score(sphere.METHOD, ball_scene, kind, SCENES if kind == "typical" else FEWER)
-    check(hit, below, width, error)
+@pytest.mark.parametrize(
+    ("method", "make", "kind"),
+    [*((without_tilt(), disc_scene, kind) for kind in ("facing", "any direction", "half seen")),
+     *((sphere.METHOD, ball_scene, kind) for kind in BALLS)],
+    ids=lambda x: x if isinstance(x, str) else "",
+)  # fmt: skip
+def test_intervals_hold_the_truth(method, make, kind):
+    hit, below, z, width, error = score(method, make, kind, FEW)
+    assert np.all(hit.mean(axis=0) >= 0.86)
+    assert np.abs(z).max() < 4.5
+    assert np.all(width.mean(axis=0) < 1.4 * 3.92 * np.sqrt(np.mean(error**2, axis=0)))
+    assert np.all(below.mean(axis=0) < 0.1)
