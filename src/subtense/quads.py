@@ -20,6 +20,7 @@ MOST_SEGMENTS = 900
 MOST_LINES = 1200
 MOST_MIXED = 140
 """Lines where sides may be lighter or darker than their ground, each for itself: there are eight times as many rings."""
+LEAST_SIDE_PX = 12.0
 SHORTEST_PX = 9.0
 ALIKE = math.radians(2.5)
 """Segments that differ by less in direction may be of one line."""
@@ -71,7 +72,7 @@ def straight_lines(gray: Pixels) -> Array:
     return _lines(_segments(gray)) if min(gray.shape) >= 16 else np.zeros((0, 2, 2))
 
 
-def quads(lines: Array, *, least_side_px: float = 12.0, mixed: bool = False) -> list[Rough]:
+def quads(lines: Array, *, least_side_px: float = LEAST_SIDE_PX, mixed: bool = False) -> list[Rough]:
     """Quadrilaterals with their sides mostly seen, best seen first.
 
     Args:

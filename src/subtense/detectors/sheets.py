@@ -22,7 +22,7 @@ from ..detection import Detection, Search
 from ..edges import LEAST_STEP, Patch
 from ..observation import Observation
 from ..photo import Photo
-from ..quads import Rough, distinct, quads, straight_lines
+from ..quads import LEAST_SIDE_PX, Rough, distinct, quads, straight_lines
 from ..quantity import Note
 from ..sheet_kinds import AS_WELL, KindFit, kind_fits, usual_cameras
 from ..straight import Outline, outline
@@ -103,6 +103,16 @@ def sheets(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]:
             if found:
                 return tuple(sorted(found, key=lambda one: float(one.seen.points_px[:, 0].mean())))
     return ()
+
+
+def reach_px(photo: Photo, search: Search, found: bool) -> float:
+    """Shortest side of a sheet that the search came down to, px of the photo."""
+    longest, several = max(photo.width_px, photo.height_px), bool(search.targets) or search.thorough
+    if longest < PICTURE_PX:
+        return LEAST_SIDE_PX / min(MOST_ENLARGED, 1.5 * PICTURE_PX / longest)
+    most = 2 * FINDING_PX if several and longest > 2 * FINDING_PX and not found else FINDING_PX
+    halvings = max(0, math.ceil(math.log2(longest / most)))
+    return float(LEAST_SIDE_PX * 2**halvings)
 
 
 def _pictures(gray: Pixels, *, several: bool) -> list[Reduced]:
