@@ -260,8 +260,8 @@ def notes(inputs: Inputs, result: Length | Area | Angle) -> tuple[Note, ...]:
     found = reference_notes(start(inputs), inputs.points.points_px.shape[-2])
     if inputs.camera is None and inputs.distortion.source.startswith(ASSUMED):
         found.append(Note("distortion_unknown", "nothing is known of the lens's distortion: "
-                          f"{100 * float(inputs.distortion.u):.2g} % (1s) in the corners of the picture is in u", "give a calibrated camera, or measure near the reference "
-                          "points and the middle of the picture"))  # fmt: skip
+                          f"{100 * float(inputs.distortion.u):.2g} % (1s) in the corners of the picture is in u",
+                          "give a calibrated camera, or measure near the reference points and the middle of the picture"))  # fmt: skip
     if isinstance(result, Area) and _crosses(inputs.path.points_px):
         found.append(Note("outline_crosses", "the outline of the area crosses itself, and parts of it are subtracted from others",
                           "mark its corners in order around it"))  # fmt: skip
@@ -337,6 +337,6 @@ AREA = Method(
 
 ANGLE = Method(
     name="plane_angle", title="an angle in a plane with four known points", inputs=Corner,
-    outputs=(Output("angle_rad", "angle", "rad", "angle"),), function=plane_angle, assumes=_ASSUMES, source=_SOURCE,
+    outputs=(Output("angle_rad", "corner", "rad", "angle in the plane"),), function=plane_angle, assumes=_ASSUMES, source=_SOURCE,
     typical="0.2 to 1 degree", example=example_angle, button="Plane angle", start=start, notes=notes,
 )  # fmt: skip

@@ -146,7 +146,7 @@ def example() -> Inputs:
 METHOD = Method(
     name="wall", title="width and height on a wall, by one height that is known", inputs=Inputs,
     outputs=(Output("length_m", "length", "m", "length"), Output("width_m", "width", "m", "its level part"),
-             Output("rise_m", "height", "m", "its upright part")),
+             Output("rise_m", "rise", "m", "its upright part")),
     function=wall,
     assumes=("the wall is upright and stands on the level ground of the reference", "the vertical lines are upright",
              "the picture is not cropped or edited after the camera's numbers were taken"),

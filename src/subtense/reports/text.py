@@ -37,6 +37,11 @@ TITLES = {
     "field_of_view": "field of view across the width",
     "angle": "angle the object subtends",
     "tilt": "tilt to the line of sight",
+    "corner": "angle in the plane",
+    "height": "height",
+    "camera_height": "camera above the plane",
+    "width": "its level part",
+    "rise": "its upright part",
 }
 
 
@@ -120,7 +125,7 @@ def headline(m: Measurement) -> str:
 
     Scales, angles and pixels keep their digits: people carry them on into other calculations.
     """
-    value = number(m.value, m.unit, _doubt(m)) if m.unit == "m" else _unrounded(m)
+    value = number(m.value, m.unit, _doubt(m)) if m.unit in ("m", "m²") else _unrounded(m)
     if m.u == 0:
         return f"{value}   exact"
     level = f"{100 * m.level:.8g} %"

@@ -17,12 +17,16 @@ from ..methods import (
     ground_plane,
     ground_sampling,
     ground_speed,
+    height,
     known_distance,
     known_size,
+    plane,
+    plane_distance,
     pose,
     same_plane,
     sphere,
     surveyed_ground,
+    wall,
 )
 from ..photo import Photo
 from .report_of import REPORTS
@@ -44,6 +48,13 @@ METHODS: dict[str, Method] = {
         ground_sampling.METHOD,
         ground_footprint.METHOD,
         surveyed_ground.METHOD,
+        same_plane.DISTANCE,
+        plane.METHOD,
+        plane.AREA,
+        plane.ANGLE,
+        plane_distance.METHOD,
+        height.METHOD,
+        wall.METHOD,
     )
 }
 """Ways to measure, by name."""
