@@ -29,7 +29,7 @@ from subtense.workflow.ground import GroundTexts, TerrainTexts, ground_document,
 DEG = math.pi / 180
 CAMERA = Camera(1600, 1200, 1500.0, 799.5, 599.5)
 LEVEL = {"slope": Quantity.exact(0.0, "rad"), "cross_slope": Quantity.exact(0.0, "rad")}
-FLAT = {**LEVEL, "refraction": Quantity.exact(1 - 1e-9, "1"), "roll": Quantity.exact(0.0, "rad")}
+FLAT = {**LEVEL, "refraction": Quantity.exact(1.0, "1"), "roll": Quantity.exact(0.0, "rad")}
 
 
 def exact(value, unit="m"):
@@ -58,8 +58,8 @@ def measured(**inputs):
 
 def test_distance_is_height_over_the_tangent():
     far, range_, depth = measured(**standing(1.6, -5 * DEG), foot=point(799.5, row(3 * DEG)))
-    assert far.value == pytest.approx(1.6 / math.tan(8 * DEG), rel=1e-9)
-    assert range_.value == pytest.approx(1.6 / math.sin(8 * DEG), rel=1e-9)
+    assert far.value == pytest.approx(1.6 / math.tan(8 * DEG), rel=1e-7)
+    assert range_.value == pytest.approx(1.6 / math.sin(8 * DEG), rel=1e-7)
     assert depth.value == pytest.approx(range_.value * math.cos(3 * DEG), rel=1e-9)
 
 
@@ -215,7 +215,7 @@ def test_trap_33_curvature(far, drop):
     assert found[0].value == pytest.approx(far, rel=1e-3)
     note = next(n for n in found[0].notes if n.code == "earth_curvature")
     assert f"{drop:.2g}" in note.text
-    assert measured(**{**inputs, "refraction": exact(1 - 1e-9, "1")}, foot=point(799.5, 599.5))[0].value < far * (
+    assert measured(**{**inputs, "refraction": exact(1.0, "1")}, foot=point(799.5, 599.5))[0].value < far * (
         1 - drop / 34
     )
 

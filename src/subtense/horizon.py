@@ -45,8 +45,8 @@ class Level:
 
 
 def effective_radius_m(refraction: Array) -> Array:
-    """(...) radius of an earth on which bent rays are straight: R / (1 - k)."""
-    return np.asarray(EARTH_RADIUS_M / (1 - np.asarray(refraction)))
+    """(...) radius of an earth on which bent rays are straight: R / (1 - k), at most a thousand R."""
+    return np.asarray(EARTH_RADIUS_M / np.maximum(1 - np.asarray(refraction), 1e-3))
 
 
 def dip_rad(height_m: Array, refraction: Array) -> Array:
