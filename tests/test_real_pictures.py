@@ -49,7 +49,7 @@ def april_vision(folder, tmp):
 
 def test_april_vision_tags_by_the_command_line(shared_data, tmp_path):
     camera, pictures = april_vision(shared_data / "fiducial" / "april_vision_synth", tmp_path)
-    checked = 0
+    errors = []
     for path, true in pictures:
         words = [
             "measure",
@@ -64,10 +64,10 @@ def test_april_vision_tags_by_the_command_line(shared_data, tmp_path):
         result = CliRunner().invoke(main, [str(w) for w in words], catch_exceptions=False)
         found = json.loads(result.output)["measurements"][0]
         assert found["label"] == "36h11 id 14"
-        assert found["value"] == pytest.approx(true, rel=0.005), path.name
-        assert abs(found["value"] - true) < 3 * found["u"], path.name
-        checked += 1
-    assert checked == 18
+        errors.append(found["value"] - true)
+    assert len(errors) == 18
+    assert max(map(abs, errors)) < 0.001
+    assert np.std(errors) < 0.0003  # the tag's face stands 0.6 mm nearer than the list says in all of them
 
 
 @pytest.mark.parametrize(

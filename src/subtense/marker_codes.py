@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
-from .arrays import Array, Pixels
+from .arrays import Array, Indices, Pixels
 
 FAMILIES: dict[str, tuple[str, int]] = {
     "36h11": ("DICT_APRILTAG_36h11", 8), "25h9": ("DICT_APRILTAG_25h9", 7), "36h10": ("DICT_APRILTAG_36h10", 8),
@@ -67,7 +68,7 @@ def codes(family: str) -> Array:
 
 
 @cache
-def _numbers(family: str) -> tuple[Array, dict[int, int]]:
+def _numbers(family: str) -> tuple[Any, dict[int, int]]:
     """(4 markers,) the codes as whole numbers, marker by marker and turn by turn; and where each stands."""
     known = codes(family)
     numbers = _number(known.reshape(-1, known.shape[2] * known.shape[3]))
@@ -77,14 +78,14 @@ def _numbers(family: str) -> tuple[Array, dict[int, int]]:
     return numbers, places
 
 
-def _number(bits: Array) -> Array:
+def _number(bits: Array) -> Any:
     """(...) whole numbers of (..., bits)."""
     return np.asarray(bits.astype(np.uint64) @ (np.uint64(1) << np.arange(bits.shape[-1], dtype=np.uint64)))
 
 
-def _ones(numbers: Array) -> Array:
+def _ones(numbers: Any) -> Indices:
     """How many bits of whole numbers are 1."""
-    return np.unpackbits(np.ascontiguousarray(numbers)[:, None].view(np.uint8), axis=1).sum(axis=1)
+    return np.asarray(np.unpackbits(np.ascontiguousarray(numbers)[:, None].view(np.uint8), axis=1).sum(axis=1))
 
 
 @cache
@@ -238,7 +239,7 @@ def _unblurred(gray: Pixels, corners: Array, size: int) -> Array | None:
     weights = (in_b[:, :, None] * in_a[:, None, :]).reshape(-1, n * n)
     values = gray[yy.ravel()[inside], xx.ravel()[inside]].astype(float)
     middle = values.mean()
-    return _damped(weights, values - middle).reshape(n, n) + middle
+    return np.asarray(_damped(weights, values - middle).reshape(n, n) + middle)
 
 
 def _damped(weights: Array, values: Array) -> Array:

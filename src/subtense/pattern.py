@@ -33,8 +33,11 @@ SETTLED_PX = 3e-3
 FEWER_PIXELS = 400
 ROUGHLY_PX = 0.1
 """The first steps go with fewer pixels, until they are this short."""
-FLOOR_PX = 0.004
-"""Standard deviation of a corner that is in any case there: uneven prints, resampled pictures, unlike blur."""
+FLOOR_PX = 0.01
+"""Standard deviation that is in any case there, of each corner by itself and of all sides outward together: uneven prints,
+resampled pictures, unlike blur."""
+LOSSY_PX = 0.025
+"""The same of a picture that was compressed with losses: what is lost is alike over a cell, and no noise."""
 LEAST_NOISE = 1e-3
 """Standard deviation of encoded values that rounding alone makes."""
 COST_NOISE = 0.01
@@ -74,7 +77,9 @@ class Fitted:
     curve: float
 
 
-def fit_pattern(gray: Array, corners_px: Array, cells: Array, curve: Quantity) -> Fitted | None:
+def fit_pattern(
+    gray: Array, corners_px: Array, cells: Array, curve: Quantity, floor_px: float = FLOOR_PX
+) -> Fitted | None:
     """Fit a pattern where it was roughly found.
 
     Args:
@@ -82,6 +87,7 @@ def fit_pattern(gray: Array, corners_px: Array, cells: Array, curve: Quantity) -
         corners_px: (4, 2) its rough corners, to a quarter of a cell.
         cells: (n, n) 1 light, 0 dark; beyond it is light.
         curve: exponent of the transfer curve.
+        floor_px: what is added to the corners' covariance in any case; see FLOOR_PX.
 
     Returns:
         The corners, or None where no such pattern is to be seen.
@@ -96,7 +102,7 @@ def fit_pattern(gray: Array, corners_px: Array, cells: Array, curve: Quantity) -
         near = begin if len(patch.value) < 2 * FEWER_PIXELS else _solve(patch.fewer(), begin, curve, ROUGHLY_PX)
         solved = None if near is None else _solve(patch, near, curve, SETTLED_PX)
         found = None if solved is None else _settled(patch, solved, curve)
-    return None if found is None or solved is None else _fitted(patch, solved, *found)
+    return None if found is None or solved is None else _fitted(patch, solved, *found, floor_px)
 
 
 @dataclass(frozen=True)
@@ -416,7 +422,7 @@ def _cost(residual: Array, weight: Array, x: Array, curve: Quantity) -> float:
     return float(residual**2 @ weight) / COST_NOISE**2 + prior**2
 
 
-def _fitted(patch: _Patch, x: Array, cov: Array, sigma: float) -> Fitted | None:
+def _fitted(patch: _Patch, x: Array, cov: Array, sigma: float, floor_px: float) -> Fitted | None:
     count = len(x) - _OTHERS
     corners = _corners(x[:count], patch.bends)
     contrast = float(x[count + _HIGH] - x[count + _LOW])
@@ -431,7 +437,9 @@ def _fitted(patch: _Patch, x: Array, cov: Array, sigma: float) -> Fitted | None:
         if other is None:
             return None
         jac[:, i] = (other - corners).ravel() / step
-    own = jac @ cov[:count, :count] @ jac.T * patch.unit_px**2 + np.eye(8) * FLOOR_PX**2
+    outward = (corners - corners.mean(axis=0)).ravel()  # in units of half a side
+    floor = (np.eye(8) + np.outer(outward, outward)) * floor_px**2
+    own = jac @ cov[:count, :count] @ jac.T * patch.unit_px**2 + floor
     return Fitted(corners * patch.unit_px + patch.middle_px, own, sigma / contrast, contrast,
                   abs(float(x[count + _BLUR])), float(x[-1]))  # fmt: skip
 

@@ -17,7 +17,7 @@ from ..dark_quads import dark_quads
 from ..detection import Detection, Search
 from ..marker_codes import FAMILIES, WEAK, Reader, Reading, cells_of, rimmed
 from ..observation import Observation
-from ..pattern import Fitted, fit_pattern
+from ..pattern import FLOOR_PX, LOSSY_PX, Fitted, fit_pattern
 from ..photo import Photo
 from ..quantity import Quantity
 from ..subpixel import refine_quad
@@ -34,6 +34,7 @@ LEAST_WEAK_PX = 10.0
 MOST_READ = 600
 MOST_FINE = 100
 """Quadrilaterals of a level that are read, and that are read through the blur: those of most contrast."""
+LOSSY = ("JPEG", "WEBP", "HEIC", "AVIF")
 COARSE_PX = 1100
 """Longer side of the level that is searched first."""
 SMALLEST_QUAD_PX = 8.0
@@ -57,12 +58,13 @@ def markers(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]
     """
     search = search or Search()
     gray = _gray(photo.pixels)
+    floor_px = LOSSY_PX if photo.metadata.form in LOSSY else FLOOR_PX
     found: list[Observation] = []
     levels = _levels(gray.shape[1], gray.shape[0], thorough=search.thorough)
     for done, scale in enumerate(levels):
         search.progress(done / len(levels))
         if scale <= 1 or not found:
-            found += [one for one in _on_level(gray, scale, search) if not _seen(one, found)]
+            found += [one for one in _on_level(gray, scale, search, floor_px) if not _seen(one, found)]
         if found and not search.thorough:
             break
     search.progress(1.0)
@@ -92,7 +94,7 @@ def _levels(width_px: int, height_px: int, *, thorough: bool) -> list[float]:
     return [*scales, 2.0] if thorough or width_px * height_px <= MOST_ENLARGED else scales
 
 
-def _on_level(gray: Pixels, scale: float, search: Search) -> list[Observation]:
+def _on_level(gray: Pixels, scale: float, search: Search, floor_px: float) -> list[Observation]:
     """Markers among the quadrilaterals of one level, located in the full picture."""
     import cv2
 
@@ -106,7 +108,7 @@ def _on_level(gray: Pixels, scale: float, search: Search) -> list[Observation]:
         found: list[Observation] = []
         for quad, reader in readers[:MOST_FINE] if fine else readers:
             read = next((r for r in (reader.read(name, correct, fine=fine) for name in families) if r), None)
-            one = read and _located(gray, _turned(_full(quad, scale), read), read, search.curve)
+            one = read and _located(gray, _turned(_full(quad, scale), read), read, search.curve, floor_px)
             if one and not _seen(one, found):
                 found.append(one)
         if found:
@@ -134,12 +136,12 @@ def _turned(quad: Array, read: Reading) -> Array:
     return np.roll(quad, read.turns, axis=0)
 
 
-def _located(gray: Pixels, corners: Array, read: Reading, curve: Quantity) -> Observation | None:
+def _located(gray: Pixels, corners: Array, read: Reading, curve: Quantity, floor_px: float) -> Observation | None:
     """A marker with its corners from its pattern, or from its sides where something lies over it; None without any."""
     patch, offset = _patch(gray, corners)
     label, rough = f"{read.family} id {read.number}", corners - offset
     cells = cells_of(read.family, read.number)
-    pattern = fit_pattern(patch, rough, cells, curve)
+    pattern = fit_pattern(patch, rough, cells, curve, floor_px)
     if pattern is not None and _believed(pattern, read, len(cells), curve):
         return Observation(pattern.corners_px + offset, cov=pattern.cov, label=label, source="pattern of the marker")
     if read.family in WEAK or read.wrong:
