@@ -200,7 +200,7 @@ def post_measure(request: Request, method: Annotated[str, InPath(max_length=100)
 
 
 def _notes(doubts: list[models.Doubt]) -> tuple[Note, ...]:
-    return tuple(Note(one.code, one.text, one.cure) for one in doubts)
+    return tuple(Note(**one.model_dump()) for one in doubts)
 
 
 def _method(name: str) -> Any:

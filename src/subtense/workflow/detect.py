@@ -121,8 +121,8 @@ def detect(
         by += [row.name] * len(seen)
         reach = row.reach(photo, told, bool(seen)) if row.reach else 0.0
         if reach > SEARCHED_FINE_PX and seen:
-            text = f"{row.title} were looked for down to about {reach:.0f} px; smaller ones were not, as larger ones are there"
-            notes.append(Note("searched_coarse", text, "look for smaller ones too with --thorough"))
+            text = f"{row.title}: looked for down to about {reach:.0f} px, as larger ones are there"
+            notes.append(Note("searched_coarse", text, "for smaller ones too: --thorough"))
     return Found(tuple(_told_apart(found)), tuple(notes), tuple(by))
 
 
