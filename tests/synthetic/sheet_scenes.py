@@ -50,7 +50,9 @@ def wedge(angle, opening, *, blur=1.0, noise=2.0, dark=40, light=200, exponent=2
     fine = 5
     y, x = (np.mgrid[0 : size * fine, 0 : size * fine] + 0.5) / fine - 0.5
     x, y = x - corner[0], y - corner[1]
-    after = np.clip(fine * (np.cos(angle) * y - np.sin(angle) * x) + 0.5, 0, 1)  # the share of a fine pixel that is light
+    after = np.clip(
+        fine * (np.cos(angle) * y - np.sin(angle) * x) + 0.5, 0, 1
+    )  # the share of a fine pixel that is light
     before = np.clip(fine * (np.sin(angle + opening) * x - np.cos(angle + opening) * y) + 0.5, 0, 1)
     share = reduced(cv2.GaussianBlur(after * before, (0, 0), blur * fine), fine)
     low, high = lights(dark, light, exponent)
