@@ -100,7 +100,7 @@ def test_extents_hold_the_truth(kind):
 def test_grainy_blurred_and_noisy_pictures_hold_the_truth(how):
     """Grain makes outlines off by up to 20 px, which is noted; blur and noise do not."""
     z, noted = [], 0
-    for seed in range(3):
+    for seed in range(2):
         for kind in ("ellipse", "box"):
             photo, _, truth, rim = scene(kind, seed, **how)
             found = outline(photo, around(rim))
@@ -108,7 +108,7 @@ def test_grainy_blurred_and_noisy_pictures_hold_the_truth(how):
             z += [(length(found.extents[name])[0] - truth[name]) / length(found.extents[name])[1] for name in EXTENTS]
     assert np.max(np.abs(z)) < 3
     assert np.sqrt(np.mean(np.square(z))) < 1.4
-    assert noted >= 4 if "amplitude" in how else noted <= 2
+    assert noted >= 2 if "amplitude" in how else noted <= 1
 
 
 def test_area_box_and_mask_belong_together():

@@ -52,13 +52,31 @@ _REASONS: dict[Reason, tuple[str, bool]] = {
     Reason.NOT_CONVERGED: ("no pose of the target fits the points", False),
     Reason.NOT_PINHOLE: ("this method needs a perspective picture, and the camera's is a panorama", False),
     Reason.OUT_OF_RANGE: ("an input left the range it has a meaning in (a length, a focal length of 0 or below)", True),
-    Reason.FOLDED: ("no plane looks like this: a part of it would lie behind the camera; are the points in their right order?", False),
-    Reason.COLLINEAR: ("the reference points do not determine the plane: three of four lie on one line, or two on one point", False),
+    Reason.FOLDED: (
+        "no plane looks like this: a part of it would lie behind the camera; are the points in their right order?",
+        False,
+    ),
+    Reason.COLLINEAR: (
+        "the reference points do not determine the plane: three of four lie on one line, or two on one point",
+        False,
+    ),
     Reason.BEYOND_HORIZON: ("a point lies on or beyond the horizon of the plane", True),
-    Reason.NO_VANISHING_POINT: ("the lines do not determine a vanishing point or the horizon: they coincide, or are too short", False),
-    Reason.NO_HEIGHT: ("the reference has no height in this view: its two ends fall on one point, or the view is straight down", True),
-    Reason.AT_OR_ABOVE_HORIZON: ("a point lies at or above the horizon of the ground: its pitch, its slope or the point is wrong, or it is no ground", True),
-    Reason.UPSIDE_DOWN: ("base and top are exchanged: the first point is the base on the plane, the second the top", False),
+    Reason.NO_VANISHING_POINT: (
+        "the lines do not determine a vanishing point or the horizon: they coincide, or are too short",
+        False,
+    ),
+    Reason.NO_HEIGHT: (
+        "the reference has no height in this view: its two ends fall on one point, or the view is straight down",
+        True,
+    ),
+    Reason.AT_OR_ABOVE_HORIZON: (
+        "a point lies at or above the horizon of the ground: its pitch, its slope or the point is wrong, or it is no ground",
+        True,
+    ),
+    Reason.UPSIDE_DOWN: (
+        "base and top are exchanged: the first point is the base on the plane, the second the top",
+        False,
+    ),
 }
 
 Partials = tuple[Array, ...]

@@ -107,9 +107,7 @@ def _sides(gray: Array, corners: Array, half: float, exponent: float) -> list[Si
     return [side for side in sides if side is not None]
 
 
-def fit_side(
-    gray: Array, start: Array, end: Array, inside: Array, half: float, exponent: float = CURVE
-) -> Side | None:
+def fit_side(gray: Array, start: Array, end: Array, inside: Array, half: float, exponent: float = CURVE) -> Side | None:
     """Fit one side in a strip of +-half px, from a light outside to a dark inside.
 
     Args:

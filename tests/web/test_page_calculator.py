@@ -107,7 +107,9 @@ def test_the_point_of_the_chart_can_be_dragged_and_moved_by_keys(visit):
     page.mouse.down()
     page.mouse.move(box["x"] + box["width"] * 0.75, box["y"] + 60, steps=5)
     page.mouse.up()
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")  # moves are drawn late
+    page.evaluate(
+        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    )  # moves are drawn late
     dragged = float(page.locator("#extent").input_value())
     assert 200 < dragged < 4000
     expect(page.get_by_test_id("nominal")).to_have_text(re.compile("mm"))

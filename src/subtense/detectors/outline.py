@@ -26,10 +26,10 @@ SMALLEST_PX = 8
 """Shorter side of a box that can be cut."""
 AMBIGUOUS = 0.03
 """Of the thing's size: extents that differ by more from run to run (1s) are noted."""
-MIXED_FROM = 0.003
-MIXED_PER_ROOT = 0.25
+MIXED_FROM = 0.001
+MIXED_PER_ROOT = 0.35
 """Where a share s of the pixels beside the outline has the colours of its other side, each side is off by up to this times
-sqrt(s) of the thing's size (1s): by 3 px of 100 for 1.5 %, by 7 for 8 %, as in drawn pictures of grainy things and grounds."""
+sqrt(s) of the thing's size (1s): by 2 px of 100 for 0.3 %, by 10 for 8 %, as in drawn pictures of grainy things and grounds."""
 LEAST_LOCATED = 0.6
 """Share of the contour that must lie on edges; less is noted."""
 RUNS = ((0.35, 3, 0.0, False), (0.25, 3, 1.5, False), (0.5, 3, 0.0, True), (0.35, 4, 2.5, True))

@@ -144,7 +144,8 @@ def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
     if not found and view.chi2 and view.chi2[0] > chi2_limit(inputs.points.points_px.size - 6):
         off = math.sqrt(view.chi2[0] / (inputs.points.points_px.size - 6))
         found.append(Note("points_misfit", "the reference points do not fit this camera: they are off by "
-                          f"{off:.2g} times what is stated of them, and the interval is too narrow", "check the points, their order and places, and the camera"))  # fmt: skip
+                          f"{off:.2g} times what is stated of them, and the interval is too narrow",
+                          "check the points, their order and places, and the camera"))  # fmt: skip
     weight = _weight(view)
     if weight >= LEAST_WEIGHT:
         one, other = (float(_numbers(pose, inputs, view)[0]) for pose in view.poses[:2])

@@ -89,16 +89,38 @@ class Detector:
 DETECTORS: dict[str, Detector] = {
     d.name: d
     for d in (
-        Detector("markers", "ArUco and AprilTag markers", markers.markers, asks="side of the markers' black square",
-                 reach=markers.reach_px),
+        Detector(
+            "markers",
+            "ArUco and AprilTag markers",
+            markers.markers,
+            asks="side of the markers' black square",
+            reach=markers.reach_px,
+        ),
         Detector("qr_codes", "QR codes", qr_codes.qr_codes, asks="side of the code"),
         Detector("faces", "faces, by their eyes", faces.faces, ("body",), extra="networks"),
-        Detector("objects", "people, vehicles and household things", objects.objects,
-                 ("body", "vehicle", "bottle", "household"), extra="networks"),
-        Detector("sheets", "sheets, cards, plates and signs", sheets.sheets, sheets.GROUPS,
-                 asks="which kind a sheet is, or its width and height", reach=sheets.reach_px),
-        Detector("circles", "coins, balls and round signs", circles.circles, circles.GROUPS,
-                 asks="which coin or ball it is, or its diameter", automatic=False),
+        Detector(
+            "objects",
+            "people, vehicles and household things",
+            objects.objects,
+            ("body", "vehicle", "bottle", "household"),
+            extra="networks",
+        ),
+        Detector(
+            "sheets",
+            "sheets, cards, plates and signs",
+            sheets.sheets,
+            sheets.GROUPS,
+            asks="which kind a sheet is, or its width and height",
+            reach=sheets.reach_px,
+        ),
+        Detector(
+            "circles",
+            "coins, balls and round signs",
+            circles.circles,
+            circles.GROUPS,
+            asks="which coin or ball it is, or its diameter",
+            automatic=False,
+        ),
     )
 }
 """Ways to see things in a photo by themselves, by name."""
