@@ -196,11 +196,13 @@ def _pyramid(pixels: Pixels, tile_px: int) -> list[tuple[int, int]]:
 
 
 def _decoded(task: dict[str, Any]) -> Photo:
-    """The picture that was decoded before, whose pixels are in `path`."""
+    """The picture that was decoded before, whose pixels are in `path`, with the metadata beside them."""
     from ..photo import Metadata, Photo
 
     width, height = task["size"]
-    return Photo(np.memmap(task["path"], np.uint8, "r", shape=(height, width, 3)), Metadata(), Path(task["name"]), "")
+    pixels = np.memmap(task["path"], np.uint8, "r", shape=(height, width, 3))
+    tags = Metadata.from_json(json.loads(Path(task["path"]).with_name("metadata.json").read_text("utf-8")))
+    return Photo(pixels, tags, Path(task["name"]), "")
 
 
 def detect(task: dict[str, Any]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import shutil
 import tempfile
 import time
@@ -20,6 +21,8 @@ from .settings import Limits
 
 TILE_PX = 512
 JPEG_QUALITY = 92
+TAGS = "metadata.json"
+"""Beside the pixels."""
 MOST_TILES = 256
 """Kept ready of each photo; a browser keeps those it has seen itself."""
 
@@ -147,6 +150,7 @@ class Photos:
             levels.append(np.memmap(path, np.uint8, "r", start, (height, width, 3)))
             start += 3 * width * height
         notes = tuple(Note(**note) for note in made["notes"])
+        (folder / TAGS).write_text(json.dumps(made["metadata"]), "utf-8")  # what a search is told of the file
         photo = Photo(levels[0], Metadata.from_json(made["metadata"]), Path(name), str(made["digest"]), notes, name)
         return Held(photo.digest[:32], photo, tuple(levels), folder, kept, asked_s=time.monotonic())
 
