@@ -62,12 +62,13 @@ describe("a shape", () => {
     const cup: Detection = {
       points_px: [[1, 2], [3, 40]], sigma_px: 1, cov: null, label: "cup", score: 1, source: "boxes", detector: "objects", shape: "length", target: "cup",
       others: ["glass"], tilt: { value: 0 }, notes: [assumed, turnedHead], method: "known_size", points_field: "ends", size_field: "size", size_prefix: "",
-      size_text: "93 ± 14 mm (1s)",
+      size_text: "93 ± 14 mm (1s)", size: { value: 0.093, u: 0.014, unit: "m", source: "assumed: spread of cups" },
     };
     const found = { ...shapeOf(cup, ""), id: "2", label: "cup" };
-    expect(inputsOf(found)).toEqual({ ends: { points_px: cup.points_px, sigma_px: 1, cov: null, label: "cup", score: 1, source: "boxes" }, size: "93 ± 14 mm (1s)", tilt: { value: 0 } });
+    expect(inputsOf(found)).toEqual({ ends: { points_px: cup.points_px, sigma_px: 1, cov: null, label: "cup", score: 1, source: "boxes" }, size: cup.size, tilt: { value: 0 } });
     expect(notesOf(found)).toEqual([assumed, turnedHead]);
     expect(notesOf({ ...found, texts: { size: "95 mm" } })).toEqual([turnedHead]); // a person said it
+    expect(inputsOf({ ...found, texts: { size: "95 mm" } }).size).toBe("95 mm");
     expect(shapeOf({ ...cup, size_text: null, size_prefix: "square " }, " 50 mm ").texts).toEqual({ size: "square 50 mm" });
     expect(shapeOf({ ...cup, size_text: null }, " ").texts).toEqual({});
     const dragged = moved(found, "ends", 0, [1, 2.1]);

@@ -541,7 +541,7 @@ OBSERVED = ("points_px", "sigma_px", "cov", "label", "score", "source")
 
 def to_measure(one: dict, size: str | None = None) -> dict:
     """An item of POST /api/measure, from what a detection says of how it is measured."""
-    told = one["size_prefix"] + size if size else one["size_text"]
+    told = one["size_prefix"] + size if size else one["size"]
     tilt = {"tilt": one["tilt"]} if one["tilt"] else {}
     inputs = {one["points_field"]: {key: one[key] for key in OBSERVED}, one["size_field"]: told, **tilt}
     return {"method": one["method"], "inputs": inputs, "label": one["label"], "notes": one["notes"]}
@@ -610,8 +610,8 @@ def test_a_job_tells_its_progress_until_it_is_done(server, desk):
     assert server.client.get(f"/api/jobs/{job['id']}").json()["state"] == "done"
 
 
-def test_everything_that_looks_unasked_is_found_at_once(server, desk):
-    """The thing that a network takes for a cup is measured, and says that its size is assumed."""
+def test_everything_that_looks_unasked_is_found_at_once(server, desk, examples):
+    """What has a usual size is measured as by the command, to the last note and line of the budget."""
     found = server.client.post("/api/detect/all", json={"photo": desk["id"]}).json()
     by = {one["detector"] for one in found["detections"]}
     assert "markers" in by and by <= {name for name, row in DETECTORS.items() if row.automatic}
@@ -621,8 +621,11 @@ def test_everything_that_looks_unasked_is_found_at_once(server, desk):
         assert ("assumed_size" in codes) == (one["target"] is not None)
     sized = [to_measure(one) for one in found["detections"] if one["size_text"]]
     sheet = server.client.post("/api/measure", json={"photo": desk["id"], "items": sized}).json()
-    heads = [m for m in sheet["measurements"] if m["what"] == "range"]
-    assert len(heads) == len(sized) and all("assumed_size" in [n["code"] for n in m["notes"]] for m in heads)
+    expected = printed("measure", examples / "desk.jpg")["measurements"]
+    assert len(sheet["measurements"]) == len(expected) and len({m["label"] for m in expected}) == len(sized) > 0
+    for mine, theirs in zip(sheet["measurements"], expected, strict=True):
+        for key in ("label", "what", "value", "u", "low", "high", "notes", "budget"):
+            assert mine[key] == theirs[key], key
 
 
 def test_what_a_person_says_narrows_the_search(server, desk):

@@ -140,7 +140,7 @@ def test_another_kind_can_be_chosen_and_moving_a_point_drops_what_was_seen(visit
         "points_px": SHEET, "sigma_px": 0.3, "cov": None, "label": "sheet 1", "score": 0.9, "source": "made up", "detector": "sheets",
         "shape": "rectangle", "target": "a4", "others": ["letter"], "tilt": None, "method": "pose", "points_field": "points",
         "notes": [{"code": "assumed_size", "text": "its size is taken to be that of A4", "cure": "say what it is"}],
-        "size_field": "target", "size_prefix": "rectangle ", "size_text": "rectangle 210 ± 1.5 mm (limits) x 297 ± 2 mm (limits)",
+        "size_field": "target", "size": None, "size_prefix": "rectangle ", "size_text": None,
     }  # fmt: skip
     a4 = next(t for t in page.evaluate("fetch('/api/targets').then((a) => a.json())")["targets"] if t["name"] == "a4")
     seen["size_text"] = "rectangle " + a4["text"]

@@ -150,6 +150,7 @@ export interface Detection extends Seen {
   size_field: string;
   size_prefix: string;
   size_text: string | null;
+  size: Record<string, unknown> | null;
 }
 /** The outline of a thing, and its extents, each as two ends. */
 export interface Outlined {

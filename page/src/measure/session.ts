@@ -36,6 +36,8 @@ export interface Found {
   prefix: string;
   /** What its size is taken to be, as the field takes it; null where it must be told. */
   text: string | null;
+  /** The same with its law and source. */
+  size: Readonly<Record<string, unknown>> | null;
   target: string | null;
   others: readonly string[];
   tilt: Readonly<Record<string, unknown>> | null;
@@ -126,13 +128,19 @@ export function inputsOf(shape: Shape): Record<string, unknown> {
   }
   if (shape.found?.tilt) inputs.tilt = shape.found.tilt;
   for (const [name, text] of Object.entries(shape.texts)) if (text.trim()) inputs[name] = text.trim();
+  if (shape.found?.size && isAssumed(shape)) inputs[shape.found.field] = shape.found.size;
   return inputs;
+}
+
+/** Whether the size is still the one that a detector took. */
+function isAssumed({ found, texts }: Shape): boolean {
+  return found !== undefined && found.text !== null && texts[found.field] === found.text;
 }
 
 /** Doubts about what was seen, for `notes` of a request; a size that a person has said is no longer assumed. */
 export function notesOf(shape: Shape): Note[] {
   const found = shape.found;
-  const assumed = found && found.text !== null && shape.texts[found.field] === found.text;
+  const assumed = isAssumed(shape);
   const seen = (found?.notes ?? []).filter((note) => note.code !== "assumed_size" || assumed);
   return [...seen, ...Object.values(shape.snapped ?? {}).flatMap((one) => one.notes)];
 }
@@ -147,7 +155,7 @@ export function shapeOf(one: Detection, told: string): Omit<Shape, "id" | "label
     texts: text ? { [one.size_field]: text } : {},
     sigma: "",
     seen: { [one.points_field]: { points_px, sigma_px, cov, label, score, source } },
-    found: { detector: one.detector, field: one.size_field, prefix: one.size_prefix, text: one.size_text, target: one.target, others: one.others, tilt: one.tilt, notes: one.notes },
+    found: { detector: one.detector, field: one.size_field, prefix: one.size_prefix, text: one.size_text, size: one.size, target: one.target, others: one.others, tilt: one.tilt, notes: one.notes },
   };
 }
 
@@ -161,7 +169,7 @@ export function outlineShape(one: Outlined): Omit<Shape, "id" | "label"> {
     texts: {},
     sigma: "",
     seen: { [one.points_field]: longest },
-    found: { detector: "outline", field: one.size_field, prefix: "", text: null, target: null, others: [], tilt: null, notes: one.notes },
+    found: { detector: "outline", field: one.size_field, prefix: "", text: null, size: null, target: null, others: [], tilt: null, notes: one.notes },
     outline: { field: one.points_field, contour: one.contour_px, extents },
   };
 }
@@ -357,8 +365,8 @@ function isFound(value: unknown): value is Found {
   const found = value as Partial<Found> | null;
   if (!found || typeof found !== "object" || !isText(found.detector) || !isText(found.field) || !isText(found.prefix)) return false;
   const named = (text: unknown) => text === null || isText(text);
-  const tilt = found.tilt === null || (typeof found.tilt === "object" && !Array.isArray(found.tilt));
-  return named(found.text) && named(found.target) && tilt && Array.isArray(found.others) && found.others.every((name) => isText(name)) && isNotes(found.notes);
+  const noun = (value: unknown) => value === null || (typeof value === "object" && !Array.isArray(value));
+  return named(found.text) && named(found.target) && noun(found.tilt) && noun(found.size) && Array.isArray(found.others) && found.others.every((name) => isText(name)) && isNotes(found.notes);
 }
 
 function isOutline(value: unknown): value is OutlineOf {

@@ -218,6 +218,7 @@ class Detection(Observation):
     size_field: str
     size_prefix: str = Field(description="stands before a size that is told, as in 'square 50 mm'")
     size_text: str | None = Field(description="the size of its target, as size_field takes it")
+    size: dict[str, Any] | None = Field(description="the same with its law and where it comes from")
 
 
 class Detections(_Answer):

@@ -168,7 +168,7 @@ def item_of(detection: Detection, size: Target | Quantity | str | None = None) -
     way = WAYS[detection.shape]
     told = way.prefix + size if isinstance(size, str) else size
     if told is None:
-        told = _size_of(detection)
+        told = size_of(detection)
     if told is None:
         return None
     if isinstance(told, Quantity) and way.size == "target":
@@ -179,7 +179,7 @@ def item_of(detection: Detection, size: Target | Quantity | str | None = None) -
     return Item(METHODS[way.method], inputs, detection.label)
 
 
-def _size_of(detection: Detection) -> Target | Quantity | None:
+def size_of(detection: Detection) -> Target | Quantity | None:
     """The size of what it is taken to be, with where that comes from."""
     known = detection.target
     if known is None:
@@ -191,11 +191,11 @@ def _size_of(detection: Detection) -> Target | Quantity | None:
 
 
 def detection_json(detection: Detection) -> dict[str, Any]:
-    """The detection with how it is measured: the method, its fields of points and of size, and the size's text."""
-    way = WAYS[detection.shape]
+    """The detection with how it is measured: the method, its fields of points and of size, and the size as text and whole."""
+    way, size = WAYS[detection.shape], size_of(detection)
     return {
         **detection.to_json(), "method": way.method, "points_field": way.points, "size_field": way.size,
-        "size_prefix": way.prefix, "size_text": size_text(detection),
+        "size_prefix": way.prefix, "size_text": size_text(detection), "size": None if size is None else size.to_json(),
     }  # fmt: skip
 
 
