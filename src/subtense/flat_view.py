@@ -15,7 +15,7 @@ from .arrays import Array
 from .camera import Camera
 from .errors import InputError
 from .geometry import Pose
-from .homography import FLOOR_PX, Fit, covariance_by, fit, mirrored, pose_of, refined_pose, transfer
+from .homography import FLOOR_PX, Fit, covariance_by, fit, mirrored, pose_of, settled_pose, transfer
 from .observation import Observation
 from .quantity import Note, Quantity
 from .target import Target
@@ -151,7 +151,7 @@ def _placed(first: Fit, disc: Disc, points_m: Array, seen: Array, cov: Array) ->
     begin = pose_of(first.h, first)
     found: list[tuple[float, Pose]] = []
     for candidate in (begin, mirrored(begin, points_m.mean(axis=0))):
-        pose = refined_pose(candidate, points_m, seen, whiten, 40)
+        pose = settled_pose(candidate, points_m, seen, whiten)
         placed = pose.apply(points_m)
         residual = whiten @ (placed[:, :2] / placed[:, 2:] - seen).reshape(-1)
         chi2 = float(residual @ residual)

@@ -290,6 +290,44 @@ def mirrored(pose: Pose, middle_m: Array) -> Pose:
     return Pose(rotation, place - rotation @ middle_m)
 
 
+def settled_pose(pose: Pose, points_m: Array, seen: Array, whiten: Array) -> Pose:
+    """The pose of the nominal scene by damped Gauss-Newton, which does not step behind the camera; see `refined_pose`."""
+    damp = 1e-6
+    jacobian, residual = _linearised(pose, points_m, seen)
+    best = float(np.sum((whiten @ residual) ** 2))
+    for _ in range(60):
+        weighted = whiten @ jacobian
+        normal = weighted.T @ weighted
+        step = -_solved(normal + damp * np.diag(np.diag(normal)), weighted.T @ (whiten @ residual))
+        trial = Pose(rotation_from_vector(step[:3]) @ pose.rotation, pose.translation_m + step[3:])
+        slopes, off = _linearised(trial, points_m, seen)
+        cost = float(np.sum((whiten @ off) ** 2))
+        if np.all(trial.apply(points_m)[..., 2] > 0) and cost <= best:
+            pose, jacobian, residual, damp, best = trial, slopes, off, max(damp / 10, 1e-12), cost
+            if np.max(abs(step)) < SETTLED * 1e-3:
+                break
+        else:
+            damp *= 10
+            if damp > 1e8:
+                break
+    return pose
+
+
+def _linearised(pose: Pose, points_m: Array, seen: Array) -> tuple[Array, Array]:
+    """(..., 2N, 6) slopes by rotation vector and translation, and (..., 2N, 1) residuals."""
+    turned = points_m @ np.swapaxes(pose.rotation, -1, -2)
+    placed = turned + pose.translation_m[..., None, :]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        inverse = 1 / placed[..., 2]
+        where = placed[..., :2] * inverse[..., None]
+    zero = np.zeros_like(inverse)
+    by_point = np.stack([np.stack([inverse, zero, -where[..., 0] * inverse], -1),
+                         np.stack([zero, inverse, -where[..., 1] * inverse], -1)], -2)  # fmt: skip
+    jacobian = np.concatenate([by_point @ -cross_matrix(turned), by_point], -1)
+    residual = (where - seen).reshape(*where.shape[:-2], -1, 1)
+    return np.asarray(jacobian.reshape(*jacobian.shape[:-3], -1, 6)), residual
+
+
 def refined_pose(pose: Pose, points_m: Array, seen: Array, whiten: Array, steps: int) -> Pose:
     """Gauss-Newton of a pose, perturbed on the left, on slopes (..., N, 2) of points (..., N, 3).
 
@@ -301,22 +339,11 @@ def refined_pose(pose: Pose, points_m: Array, seen: Array, whiten: Array, steps:
         steps: how many.
     """
     lead = np.broadcast_shapes(points_m.shape[:-2], seen.shape[:-2])
-    rotation = np.broadcast_to(pose.rotation, (*lead, 3, 3))
-    shift = np.broadcast_to(pose.translation_m, (*lead, 3))
+    now = Pose(np.broadcast_to(pose.rotation, (*lead, 3, 3)), np.broadcast_to(pose.translation_m, (*lead, 3)))
     for _ in range(steps):
-        turned = points_m @ np.swapaxes(rotation, -1, -2)
-        placed = turned + shift[..., None, :]
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            inverse = 1 / placed[..., 2]
-            where = placed[..., :2] * inverse[..., None]
-        zero = np.zeros_like(inverse)
-        by_point = np.stack([np.stack([inverse, zero, -where[..., 0] * inverse], -1),
-                             np.stack([zero, inverse, -where[..., 1] * inverse], -1)], -2)  # fmt: skip
-        jacobian = np.concatenate([by_point @ -cross_matrix(turned), by_point], -1)
-        residual = (where - seen).reshape(*where.shape[:-2], -1, 1)
-        step = -_solved(whiten @ jacobian.reshape(*jacobian.shape[:-3], -1, 6), whiten @ residual)
-        rotation = rotation_from_vector(step[..., :3]) @ rotation
-        shift = shift + step[..., 3:]
+        jacobian, residual = _linearised(now, points_m, seen)
+        step = -_solved(whiten @ jacobian, whiten @ residual)
+        now = Pose(rotation_from_vector(step[..., :3]) @ now.rotation, now.translation_m + step[..., 3:])
         if np.max(abs(step), initial=0.0) < SETTLED:
             break
-    return Pose(rotation, shift)
+    return now
