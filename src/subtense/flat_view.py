@@ -167,12 +167,10 @@ def reference_notes(view: FlatView, count: int) -> list[Note]:
     if view.fit.freedom <= 0:
         return [Note("points_unchecked", f"{count} reference points fit any plane: a wrong click or a wrong order can't be noticed",
                      "give a fifth point of the plane")]  # fmt: skip
-    misfit = view.fit.misfit
-    if not misfit:
+    if not view.fit.misfit:
         return []
-    worst = int(np.argmax(view.fit.snooped)) + 1
-    text = (f"the reference points do not fit one plane: they are off by {misfit:.2g} times what is stated of them, point {worst} "
-            "most, and the interval is too narrow")  # fmt: skip
-    return [
-        Note("points_misfit", text, f"look at point {worst} again, at the order of the points and at their coordinates")
-    ]
+    worst = int(np.argmax(view.fit.snooped))
+    text = (f"the reference points do not fit one plane: point {worst + 1} lies off what the others say by "
+            f"{view.fit.snooped[worst]:.2g} times what is stated, and the interval is too narrow")  # fmt: skip
+    cure = f"look at point {worst + 1} again, at the order of the points and at their coordinates"
+    return [Note("points_misfit", text, cure)]

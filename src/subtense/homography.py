@@ -25,6 +25,8 @@ STEPS = 8
 SETTLED = 1e-9
 MISFIT_Z = 3.72
 """Normal quantile (1 in 1e4) beyond which residuals are no chance."""
+ONE_OFF = 3e-3
+"""Probability that any point of a right set is called off: a single wrong click shows by itself sooner than in the sum."""
 DEGENERATE = 1e-9
 """Singular value, in units of the largest, below which the points do not determine a plane's picture."""
 FLOOR_PX = 1e-3
@@ -84,11 +86,12 @@ class Fit:
     snooped: Array
 
     @property
-    def misfit(self) -> float:
-        """Root mean square of the residuals in what is stated, where they are beyond chance; 0 else."""
-        if self.freedom <= 0 or self.chi2 <= chi2_limit(self.freedom):
-            return 0.0
-        return math.sqrt(self.chi2 / self.freedom)
+    def misfit(self) -> bool:
+        """Whether the residuals are beyond chance, all together or those of one point alone."""
+        if self.freedom <= 0:
+            return False
+        alone = math.sqrt(-2 * math.log(ONE_OFF / len(self.snooped)))
+        return self.chi2 > chi2_limit(self.freedom) or float(self.snooped.max()) > alone
 
 
 def chi2_limit(freedom: int) -> float:
