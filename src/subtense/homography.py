@@ -235,7 +235,7 @@ def covariance_by(nouns: Iterable[Noun | None], seen: Callable[..., Array], size
 
     Args:
         nouns: what may move; None and exact ones are left out.
-        seen: takes all nouns in order and gives an array of `size` numbers.
+        seen: takes all nouns in order, one of them with a leading axis, and gives `size` numbers for each row of it.
         size: how many.
     """
     those = list(nouns)
@@ -243,12 +243,13 @@ def covariance_by(nouns: Iterable[Noun | None], seen: Callable[..., Array], size
     for place, noun in enumerate(those):
         for part in noun.parts() if noun is not None else ():
             assert noun is not None
-            for column in _factor(part).T:
-                value = np.asarray(part.value, float)
-                ends = [seen(*those[:place], noun.moved({part.key: value + sign * column}), *those[place + 1 :]).reshape(-1)
-                        for sign in (1.0, -1.0)]  # fmt: skip
-                half = (ends[0] - ends[1]) / 2
-                cov += np.outer(half, half)
+            value, columns = np.asarray(part.value, float).reshape(-1, 1), _factor(part)
+            up, down = (
+                seen(*those[:place], noun.moved({part.key: value + sign * columns}), *those[place + 1 :])
+                for sign in (1.0, -1.0)
+            )
+            half = np.broadcast_to((up - down).reshape(-1, size) / 2, (columns.shape[1], size))
+            cov += half.T @ half
     return cov
 
 

@@ -14,8 +14,8 @@ from subtense.methods import height, wall
 from subtense.observation import Observation
 from subtense.quantity import Quantity
 
-SCENES, FEWER = 1000, 300
-BOUNDS = {SCENES: (0.926, 0.971), FEWER: (0.903, 0.987)}
+SCENES, FEWER = 1000, 150
+BOUNDS = {SCENES: (0.926, 0.971), FEWER: (0.88, 1.0)}
 WIDTH, HEIGHT = 1600, 1200
 CLICK_PX = 0.7
 U_CAMERA = np.array([15.0, 0.0, 8.0, 8.0, 0.01, 0, 0, 0, 0])
@@ -156,14 +156,14 @@ SCENARIOS = {
 PLANES = KINDS  # the name under which benchmarks look for kinds
 
 
-def score(name, kind, scenes, seed=0):
+def score(name, kind, scenes, seed=0, draws=20_000):
     """(scenes, outputs) whether the interval holds the truth, whether the truth lies below it, and z values."""
     method, make = SCENARIOS[name]
     rng = np.random.default_rng([seed, *map(ord, name + kind)])
     hit, below, z = [], [], []
     for i in range(scenes):
         inputs, true = make(kind, rng)
-        found = propagate.measure(method, inputs, draws=20_000, seed=i)
+        found = propagate.measure(method, inputs, draws=draws, seed=i)
         ends = [(-np.inf if m.low is None else m.low, np.inf if m.high is None else m.high) for m in found]
         hit.append([low <= t <= high for (low, high), t in zip(ends, true, strict=True)])
         below.append([t < low for (low, _), t in zip(ends, true, strict=True)])
@@ -211,13 +211,13 @@ def check(hit, below):
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_heights_and_walls(name):
-    hit, below, _ = score(name, "typical", FEWER)
+    hit, below, _ = score(name, "typical", FEWER, draws=4_000)
     check(hit, below)
 
 
 @pytest.mark.parametrize("sets", [(0, 1, 2), (0, 1)])
 def test_cameras_from_lines(sets):
-    z, refused = line_cameras(60, sets)
-    assert refused < 6
-    assert np.all(np.mean(abs(z) < 1.96, axis=0) > 0.86) and np.abs(z).max() < 5
+    z, refused = line_cameras(25, sets)
+    assert refused < 4
+    assert np.all(np.mean(abs(z) < 1.96, axis=0) > 0.8) and np.abs(z).max() < 5
     assert np.all(z.std(axis=0) > 0.6), "u is padded"

@@ -1,6 +1,6 @@
 """How often the 95 % interval of the methods of a plane holds the truth, and whether gross clicks are flagged.
 
-1,000 scenes a geometry must give 92.6 to 97.1 %, FEWER must give 90.3 to 98.7 % (binomial, 0.1 % two-sided), with the misses on both
+1,000 scenes a geometry must give 92.6 to 97.1 %, 150 must give 88 % or more (binomial, 0.1 % two-sided), with the misses on both
 sides. benchmarks/planes.py has 5,000 scenes of all.
 """
 
@@ -17,8 +17,8 @@ from subtense.observation import Observation
 from subtense.quantity import Quantity
 from subtense.target import Target
 
-SCENES, FEWER = 1000, 300
-BOUNDS = {SCENES: (0.926, 0.971), FEWER: (0.903, 0.987)}
+SCENES, FEWER = 1000, 150
+BOUNDS = {SCENES: (0.926, 0.971), FEWER: (0.88, 1.0)}
 WIDTH, HEIGHT = 1600, 1200
 CLICK_PX = 0.7
 U_CAMERA = np.array([15.0, 0.0, 8.0, 8.0, 0.01, 0, 0, 0, 0])
@@ -131,7 +131,7 @@ def off_plane_scene(kind, rng):
     truth, told, pose, known, points, _ = placed(kind, rng, 0.6, 2)
     side = -np.sign(pose.rotation[:, 2] @ pose.translation_m)  # towards the camera, along the plane's normal
     height = rng.uniform(0.02, 0.2)
-    points = [*points, 0, 0, side * height]
+    points = points + np.array([0, 0, side * height])
     pixels = truth.project(pose.apply(np.concatenate([known, points]))) + rng.normal(0, CLICK_PX, (len(known) + 2, 2))
     n = len(known)
     stated = Quantity.normal(height + 0.02 * rng.standard_normal(), 0.02, "m")
@@ -158,14 +158,14 @@ SCENARIOS = {
 }  # fmt: skip
 
 
-def score(name, kind, scenes, seed=0):
+def score(name, kind, scenes, seed=0, draws=20_000):
     """(scenes, outputs) whether the interval holds the truth, whether the truth lies below it, and z values."""
     method, make = SCENARIOS[name]
     rng = np.random.default_rng([seed, *map(ord, name + kind)])
     hit, below, z = [], [], []
     for i in range(scenes):
         inputs, true = make(kind, rng)
-        found = propagate.measure(method, inputs, draws=20_000, seed=i)
+        found = propagate.measure(method, inputs, draws=draws, seed=i)
         ends = [(-np.inf if m.low is None else m.low, np.inf if m.high is None else m.high) for m in found]
         hit.append([low <= t <= high for (low, high), t in zip(ends, true, strict=True)])
         below.append([t < low for (low, _), t in zip(ends, true, strict=True)])
@@ -180,16 +180,16 @@ def check(hit, below):
     assert np.all(below.mean(axis=0) < 0.8 * (1 - share) + 0.01), "nearly all misses lie on one side"
 
 
-@pytest.mark.parametrize("kind", PLANES)
-def test_length(kind):
-    hit, below, z = score("length", kind, SCENES)
+@pytest.mark.parametrize(("kind", "scenes"), [("good", FEWER), ("typical", SCENES), ("bad", FEWER)])
+def test_length(kind, scenes):
+    hit, below, z = score("length", kind, scenes, draws=4_000)
     check(hit, below)
     assert np.abs(z).max() < 6
 
 
 @pytest.mark.parametrize("name", [name for name in SCENARIOS if name != "length"])
 def test_others(name):
-    hit, below, _ = score(name, "typical", FEWER)
+    hit, below, _ = score(name, "typical", FEWER, draws=4_000)
     check(hit, below)
 
 
@@ -197,7 +197,7 @@ def test_others(name):
 def test_a_gross_click_among_nine_reference_points_is_flagged_or_does_no_harm(gross_px):
     rng = np.random.default_rng(gross_px)
     fine = []
-    for i in range(100):
+    for i in range(60):
         inputs, p = in_plane("good", rng, plane.METHOD, 2, gross_px=gross_px)
         [m] = propagate.measure(plane.METHOD, inputs, draws=20_000, seed=i)
         fine.append("points_misfit" in {n.code for n in m.notes} or m.low <= np.linalg.norm(p[1] - p[0]) <= m.high)
@@ -206,5 +206,5 @@ def test_a_gross_click_among_nine_reference_points_is_flagged_or_does_no_harm(gr
 
 def test_right_clicks_are_not_called_wrong():
     rng = np.random.default_rng(5)
-    notes = [propagate.measure(plane.METHOD, in_plane("good", rng, plane.METHOD, 2)[0])[0].notes for _ in range(300)]
-    assert sum("points_misfit" in {n.code for n in one} for one in notes) <= 3  # three in a thousand are expected
+    notes = [propagate.measure(plane.METHOD, in_plane("good", rng, plane.METHOD, 2)[0])[0].notes for _ in range(150)]
+    assert sum("points_misfit" in {n.code for n in one} for one in notes) <= 2  # three in a thousand are expected
