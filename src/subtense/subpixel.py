@@ -126,7 +126,7 @@ def fit_side(gray: Array, start: Array, end: Array, inside: Array, half: float, 
     if across @ (inside - start) > 0:
         across = -across
     t, n, value = _strip(gray, start, along, across, length, half)
-    if len(value) < 24:
+    if len(value) < 24 or not np.any(n < -half / 3) or not np.any(n > half / 3):
         return None
     low, high = (float(np.median(value[where])) for where in (n < -half / 3, n > half / 3))
     scatter = max(

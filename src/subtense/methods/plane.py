@@ -70,7 +70,7 @@ class Inputs:
         if self.path.points_px.shape[-2] < 2:
             raise InputError("path", f"{self.path.points_px.shape[-2]} points", "give two or more")
         if self.raised and self.camera is None and self.camera_height is None:
-            raise InputError("off_plane", float(np.ravel(self.off_plane.value)[0]),
+            raise InputError("off_plane", str(np.asarray(self.off_plane.value).tolist()),
                              "give the camera too, or its height over the plane with camera_height")  # fmt: skip
 
     @property
