@@ -12,6 +12,7 @@ from pathlib import Path
 
 import calc
 import calibration
+import marker_speed
 import monte_carlo
 import pictures
 import rows
@@ -28,6 +29,7 @@ ALL = {
     "rows": rows,
     "pictures": pictures,
     "calibration": calibration,
+    "marker_speed": marker_speed,
 }
 
 

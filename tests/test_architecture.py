@@ -21,6 +21,7 @@ HEAVY = {
     "matplotlib",
     "lensfunpy",
     "pycolmap",
+    "pyapriltags",
     "rasterio",
     "ai_edge_litert",
     "onnxruntime",

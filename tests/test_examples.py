@@ -54,6 +54,17 @@ def test_desk_marker_with_the_true_camera(examples, truth, tmp_path):
     assert found["range"].u / found["range"].value < 0.004
 
 
+@pytest.mark.parametrize(("side", "wrong"), [("50 mm", False), ("62.5 mm", True), ("49 mm", False)])
+def test_a_marker_measured_with_its_border_is_told_by_the_sheet_beside_it(examples, side, wrong):
+    """A tag of 8 cells with its white border is 10/8 as large, and so is every distance by it."""
+    from subtense.workflow.found import Asked
+    from subtense.workflow.measure_input import measure_document
+
+    document = measure_document(Photo.load(examples / "desk.jpg"), marker_size=side, asked=Asked(targets=("a4",)))
+    assert [note.code for note in document.notes if note.code == "size_convention"] == ["size_convention"] * wrong
+    assert {m.label for m in document.measurements} == {"36h11 id 7", "a4"}
+
+
 @pytest.mark.parametrize(
     ("file", "thing", "ends", "size"),
     [

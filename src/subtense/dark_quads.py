@@ -11,6 +11,8 @@ from .arrays import Array, Pixels
 WINDOWS_PX = (5, 13, 23)
 """Surroundings whose mean a pixel is compared with; small ones part what lies close, large ones bridge soft edges."""
 LEAST_CONTRAST = 7
+FULL = 0.012
+"""Least area over the square of the outline's length; a square has 1/16, one turned by 80 degrees 0.03."""
 STRAIGHT = 0.035
 """Of the outline's length: how far it may stray from its four sides."""
 
@@ -41,6 +43,8 @@ def dark_quads(gray: Pixels, smallest_px: float) -> list[Array]:
 
 
 def _quad(cv2: Any, outline: Any, smallest_px: float) -> Array | None:
+    if cv2.contourArea(outline) < FULL * len(outline) ** 2:
+        return None
     polygon = cv2.approxPolyDP(outline, STRAIGHT * len(outline), True)
     if len(polygon) != 4 or not cv2.isContourConvex(polygon):
         return None

@@ -2,16 +2,19 @@
 
 OpenCV finds the quadrilaterals, on a coarse level of the picture first; which marker one is, is read here in all families at
 once; and its corners are those of its whole pattern, fitted at full resolution (see `pattern`): OpenCV's own make a marker too
-small by 0.2 to 2.7 %. The size of a marker is that of its black square, without the white border.
+small by 0.2 to 2.7 %. The size of a marker is that of its black square, without the white border; of families with data outside
+the border (`apriltag_library`) that of the border.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
+from .. import apriltag_library
 from ..arrays import Array, Pixels
 from ..dark_quads import dark_quads
 from ..detection import Detection, Search
@@ -22,7 +25,8 @@ from ..photo import Photo
 from ..quantity import Quantity
 from ..subpixel import refine_quad
 
-__all__ = ["FAMILIES", "markers"]
+ALL_FAMILIES = (*FAMILIES, *apriltag_library.FAMILIES)
+"""Those that are tried unasked, and those of the library, which must be asked for."""
 
 WORST_MISFIT = 0.25
 """Rms residual over contrast beyond which there is no marker."""
@@ -59,6 +63,8 @@ def markers(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]
     search = search or Search()
     gray = _gray(photo.pixels)
     floor_px = LOSSY_PX if photo.metadata.form in LOSSY else FLOOR_PX
+    if search.family in apriltag_library.FAMILIES:
+        return _by_library(gray, search.family, search.curve, floor_px)
     found: list[Observation] = []
     levels = _levels(gray.shape[1], gray.shape[0], thorough=search.thorough)
     for done, scale in enumerate(levels):
@@ -68,6 +74,20 @@ def markers(photo: Photo, search: Search | None = None) -> tuple[Detection, ...]
         if found and not search.thorough:
             break
     search.progress(1.0)
+    return tuple(Detection(one, "square") for one in sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))
+
+
+def _by_library(gray: Pixels, family: str, curve: Quantity, floor_px: float) -> tuple[Detection, ...]:
+    """Tags of a family that only the library knows, left to right."""
+    found = []
+    for tag in apriltag_library.find(gray, family):
+        patch, offset = _patch(gray, tag.corners_px)
+        near = replace(tag, corners_px=tag.corners_px - offset)
+        fitted = apriltag_library.located(patch, near, family, curve, floor_px)
+        if fitted is not None and fitted[2] < WORST_PATTERN:
+            corners, cov, _ = fitted
+            label = f"{family} id {tag.number}"
+            found.append(Observation(corners + offset, cov=cov, label=label, source="pattern of the marker"))
     return tuple(Detection(one, "square") for one in sorted(found, key=lambda o: float(o.points_px[:, 0].mean())))
 
 
@@ -166,7 +186,7 @@ def _believed(pattern: Fitted, read: Reading, cells: int, curve: Quantity) -> bo
 
 def _patch(gray: Pixels, corners: Array) -> tuple[Array, Array]:
     """The part of the picture around a marker, 0 to 1, and where its first pixel lies."""
-    margin = 0.4 * np.ptp(corners, axis=0).max() + 4
+    margin = 0.8 * np.ptp(corners, axis=0).max() + 4
     low = np.maximum(np.floor(corners.min(axis=0) - margin).astype(int), 0)
     high = np.ceil(corners.max(axis=0) + margin).astype(int) + 1
     return gray[low[1] : high[1], low[0] : high[0]] / 255.0, low.astype(float)

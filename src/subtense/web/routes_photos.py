@@ -14,7 +14,7 @@ from starlette.datastructures import UploadFile
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from ..detection import Detection, parse_curve, unknown_curve
-from ..detectors.markers import FAMILIES
+from ..detectors.markers import ALL_FAMILIES
 from ..errors import InputError, UnknownCameraError
 from ..observation import Observation
 from ..quantity import Note
@@ -230,8 +230,8 @@ def _task(request: Request, name: str, photo: Held, body: models.Search) -> dict
     """What a child is told: all that a person said, checked here, where a wrong word costs nothing."""
     if name != ALL and name not in DETECTORS:
         raise InputError("detector", name, f"known are {ALL}, {', '.join(DETECTORS)}")
-    if body.family is not None and body.family not in FAMILIES:
-        raise InputError("family", body.family, f"known are {', '.join(FAMILIES)}")
+    if body.family is not None and body.family not in ALL_FAMILIES:
+        raise InputError("family", body.family, f"known are {', '.join(ALL_FAMILIES)}")
     try:
         wanted = [find_target(text, "targets") for text in body.targets]
         only = [] if name == ALL else [name]

@@ -67,7 +67,7 @@ class Found:
 
 
 def detectors_for(only: Sequence[str], targets: Sequence[KnownTarget]) -> list[Detector]:
-    """The rows to ask: those named; else those that find the targets; else all that look unasked.
+    """The rows to ask: those named and those that find the targets; with neither, all that look unasked.
 
     Raises:
         InputError: no such detector, or a target that none of them finds.
@@ -75,7 +75,7 @@ def detectors_for(only: Sequence[str], targets: Sequence[KnownTarget]) -> list[D
     for name in only:
         if name not in DETECTORS:
             raise InputError("--only", name, f"known are {', '.join(DETECTORS)}")
-    asked = [DETECTORS[name] for name in only] or list(DETECTORS.values())
+    asked = list(DETECTORS.values()) if targets else [DETECTORS[name] for name in only] or list(DETECTORS.values())
     if not targets:
         return asked if only else [row for row in asked if row.automatic]
     for target in targets:
@@ -83,7 +83,7 @@ def detectors_for(only: Sequence[str], targets: Sequence[KnownTarget]) -> list[D
             raise InputError(
                 "--target", target.name, "nothing finds it by itself; give its ends with --line and --size"
             )
-    return [row for row in asked if any(target.group in row.groups for target in targets)]
+    return [row for row in asked if row.name in only or any(target.group in row.groups for target in targets)]
 
 
 def detect(

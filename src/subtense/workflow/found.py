@@ -8,9 +8,9 @@ from pathlib import Path
 
 from ..camera import Camera
 from ..detection import Search, parse_curve, unknown_curve
+from ..detectors.markers import ALL_FAMILIES
 from ..document import Document
 from ..errors import InputError, NothingFoundError
-from ..marker_codes import FAMILIES
 from ..photo import Photo
 from ..quantity import Quantity
 from ..targets import find_target
@@ -49,8 +49,8 @@ class Asked:
         Raises:
             InputError: a name or text that can't be read.
         """
-        if self.family is not None and self.family not in FAMILIES:
-            raise InputError("--marker-family", self.family, f"known are {', '.join(FAMILIES)}")
+        if self.family is not None and self.family not in ALL_FAMILIES:
+            raise InputError("--marker-family", self.family, f"known are {', '.join(ALL_FAMILIES)}")
         rows = tuple(find_target(name, "--target", self.target_file) for name in self.targets)
         return Search(rows, self.family, unknown_curve() if self.curve is None else parse_curve(self.curve), self.thorough,
                       self.model, camera=camera)  # fmt: skip

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..detection import Detection, Search, unknown_curve
-from ..detectors.markers import FAMILIES
+from ..detectors.markers import ALL_FAMILIES
 from ..distribution import normal_quantile
 from ..document import Document
 from ..edited import refusal
@@ -24,8 +24,9 @@ from ..targets import KnownTarget
 from .detect import Found, detect, item_of
 from .given import inputs_from_json, inputs_from_text, read_json
 from .grade import graded_line
-from .in_photo import Item, measure_item
+from .in_photo import Item, item_inputs, measure_item
 from .resolve_camera import CAMERA_SOURCES, Resolved, resolve_camera
+from .size_convention import planes_of, size_convention
 
 
 def measure_lines(
@@ -81,8 +82,8 @@ def measure_markers(
         NothingFoundError: no marker.
         UnknownCameraError: no camera.
     """
-    if family is not None and family not in FAMILIES:
-        raise InputError("--marker-family", family, f"known are {', '.join(FAMILIES)}")
+    if family is not None and family not in ALL_FAMILIES:
+        raise InputError("--marker-family", family, f"known are {', '.join(ALL_FAMILIES)}")
     resolved = resolve_camera(photo, camera)
     found = detect(photo, ["markers"], Search(family=family, curve=curve or unknown_curve(), camera=resolved.camera))
     if not found.detections:
@@ -111,6 +112,7 @@ def measure_detections(
         A document; what has no answer is a note `refused`, and what has no size a note `size_unknown`.
     """
     documents, notes = [], [*found.notes]
+    flat: list[tuple[Detection, object]] = []
     for one, detector in zip(found.detections, found.detectors, strict=True):
         item = item_of(one, sizes.get(detector, sizes.get("")) if one.target is None else None)
         if item is None:
@@ -125,11 +127,12 @@ def measure_detections(
             notes.append(Note("refused", f"{one.label}: {error}"))
             continue
         documents.append(_with_notes(document, (*assumed(one, stated), *one.notes)))
+        flat.append((one, item_inputs(item, photo, camera)))
     if not documents:
         told = camera.to_json() if isinstance(camera, Resolved) else None
         return Document((), told, photo.to_json(), (*photo.notes, *notes))
     whole = joined(documents)
-    return dataclasses.replace(whole, notes=(*whole.notes, *notes))
+    return dataclasses.replace(whole, notes=(*whole.notes, *notes, *size_convention(planes_of(flat))))
 
 
 def assumed(one: Detection, stated: Sequence[KnownTarget]) -> tuple[Note, ...]:

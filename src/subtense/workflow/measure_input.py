@@ -68,7 +68,7 @@ def measure_document(
 
 def what_to_look_for(asked: Asked, marker_size: str | None, lines: Sequence[str]) -> Asked | None:
     """What is left to find by itself: nothing beside lines alone, markers where only their size was given, else everything."""
-    if asked.only or asked.targets:
+    if asked.only or (asked.targets and marker_size is None):
         return asked
     if marker_size is not None:
         return dataclasses.replace(asked, only=("markers",))
