@@ -84,7 +84,12 @@ def examples() -> list[Row]:
 def outcome(m, true: float, u_true: float = 0.0) -> Row:
     """Measured value, interval, relative error, and the error in u, that of the truth included."""
     interval = f"{m.low:.4g} to {m.high:.4g} m"
-    return f"{m.value:.4g} m", interval, percent(m.value / true - 1, 2), f"{(m.value - true) / np.hypot(m.u, u_true):+.1f} u"
+    return (
+        f"{m.value:.4g} m",
+        interval,
+        percent(m.value / true - 1, 2),
+        f"{(m.value - true) / np.hypot(m.u, u_true):+.1f} u",
+    )
 
 
 def frc_2019() -> list[Row]:
@@ -119,7 +124,9 @@ def frc_2024() -> list[Row]:
     for name, true in (("Amp_42in.jpg", 1.0668), ("Loading_83in.jpg", 2.1082)):
         photo = Photo.load(DATA / "fiducial" / "frc2024" / name)
         found = measure_markers(photo, Quantity.interval(0.1651, 0.0005, "m"), camera="f=1127.5 ± 16 px").measurements
-        for far, tilt in zip((m for m in found if m.what == "range"), (m for m in found if m.what == "tilt"), strict=True):
+        for far, tilt in zip(
+            (m for m in found if m.what == "range"), (m for m in found if m.what == "tilt"), strict=True
+        ):
             share = float(np.cos(tilt.value))  # of the range, to the plane
             rows.append((name, far.label, f"{true:.2f} m", f"{far.value * share:.3f} m",
                          f"{far.low * share:.3f} to {far.high * share:.3f} m", f"{100 * (far.value * share / true - 1):+.1f} %"))  # fmt: skip
