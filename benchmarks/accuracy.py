@@ -128,8 +128,16 @@ def frc_2024() -> list[Row]:
             (m for m in found if m.what == "range"), (m for m in found if m.what == "tilt"), strict=True
         ):
             share = float(np.cos(tilt.value))  # of the range, to the plane
-            rows.append((name, far.label, f"{true:.2f} m", f"{far.value * share:.3f} m",
-                         f"{far.low * share:.3f} to {far.high * share:.3f} m", f"{100 * (far.value * share / true - 1):+.1f} %"))  # fmt: skip
+            rows.append(
+                (
+                    name,
+                    far.label,
+                    f"{true:.2f} m",
+                    f"{far.value * share:.3f} m",
+                    f"{far.low * share:.3f} to {far.high * share:.3f} m",
+                    f"{100 * (far.value * share / true - 1):+.1f} %",
+                )
+            )
     return rows
 
 
