@@ -122,6 +122,8 @@ class Method:
         start: for estimators, the nominal solution that `function` refines (its second argument).
         derivative: partial derivatives by (field, part key): {output: {(field, key): one array a
             component}}; None where it has none.
+        place: the arguments of `function` to where in the camera's frame that is whose range is given, (..., 3) m, NaN
+            without an answer; None for methods that place nothing.
         notes: doubts that follow from the inputs and the nominal result.
         most_draws: where the adaptive procedure stops at the latest.
         vectorised: False for engines that take one scene at a time.
@@ -140,6 +142,7 @@ class Method:
     prepare: Callable[[Any], Any] = field(default=lambda inputs: inputs)
     start: Callable[[Any], Any] | None = None
     derivative: Callable[[Any, Any], Mapping[str, Mapping[tuple[str, str], Partials]] | None] | None = None
+    place: Callable[..., Array] | None = None
     notes: Callable[[Any, Any], tuple[Note, ...]] = field(default=lambda inputs, result: ())
     vectorised: bool = True
     most_draws: int = 1_000_000

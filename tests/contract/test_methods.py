@@ -84,3 +84,19 @@ def test_is_on_the_command_line(method, tmp_path):
     assert result.exit_code == 0
     value = propagate.measure(method, method.example())[0].value
     assert json.loads(result.output)["measurements"][0]["value"] == pytest.approx(value)
+
+
+def test_places_what_it_ranges(method):
+    """Range and depth are those of the place, whatever is moved."""
+    names = [output.name for output in method.outputs]
+    if method.place is None:
+        assert method.name not in ("known_size", "pose", "ground_plane", "circle", "sphere")
+        return
+    inputs = method.prepare(method.example())
+    start = (method.start(inputs),) if method.start else ()
+    grown = inputs.camera.moved({"0": np.asarray(inputs.camera.f_px) * np.array([[1.0, 1.03]])})
+    inputs = dataclasses.replace(inputs, camera=grown)
+    place, result = method.place(inputs, *start), method.function(inputs, *start)
+    assert place.shape == (2, 3)
+    assert np.linalg.norm(place, axis=-1) == pytest.approx(result.range_m, rel=1e-9)
+    assert "depth_m" not in names or place[..., 2] == pytest.approx(result.depth_m, rel=1e-9)

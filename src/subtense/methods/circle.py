@@ -108,14 +108,9 @@ def circle(inputs: Inputs, begin: Start) -> Result:
     """
     rays = inputs.camera.rays(inputs.rim.points_px)
     cone, converged = refit(begin.fit, rays)
-    flattening = None if inputs.flattening is None else np.asarray(inputs.flattening.value)
-    diameter, side = np.asarray(inputs.diameter.value), np.asarray(inputs.side.value)
-    short, long = _half_angles(cone, begin, flattening)
+    diameter = np.asarray(inputs.diameter.value)
+    range_m, depth, (short, long), _ = _centre(inputs, begin, cone)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        range_m = diameter / 2 * np.sqrt(1 + (1 - short**2) / long**2)
-        off = diameter / 2 * short * np.sqrt(np.maximum(1 - (short / long) ** 2, 0) / (1 + short**2))
-        ahead = np.sqrt(range_m**2 - (side * off) ** 2)
-        depth = ahead * cone.axis[..., 2] - side * off * cone.short[..., 2]
         extension = 1 + np.asarray(inputs.focus.value) * (inputs.camera.nominal_focal_m or 0.0) / depth
         cosine = short / (long * np.sqrt(1 + long**2 - short**2))
         tilt = np.arccos(np.clip(cosine, -1.0, 1.0))
@@ -128,6 +123,26 @@ def circle(inputs: Inputs, begin: Start) -> Result:
         (~(depth_m > 0), Reason.BEHIND_CAMERA),
     )  # fmt: skip
     return Result(range_m, depth_m, tilt, code)
+
+
+def place(inputs: Inputs, begin: Start) -> Array:
+    """(..., 3) the disc's centre in the camera's frame, m."""
+    cone, _ = refit(begin.fit, inputs.camera.rays(inputs.rim.points_px))
+    _, depth, _, centre = _centre(inputs, begin, cone)
+    return np.asarray(centre * (circle(inputs, begin).depth_m / depth)[..., None])
+
+
+def _centre(inputs: Inputs, begin: Start, cone: Cone) -> tuple[Array, Array, tuple[Array, Array], Array]:
+    """At infinite focus: range and depth of the centre, the tangents of both half angles, and the centre (..., 3)."""
+    flattening = None if inputs.flattening is None else np.asarray(inputs.flattening.value)
+    diameter, side = np.asarray(inputs.diameter.value), np.asarray(inputs.side.value)
+    short, long = _half_angles(cone, begin, flattening)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        range_m = diameter / 2 * np.sqrt(1 + (1 - short**2) / long**2)
+        off = diameter / 2 * short * np.sqrt(np.maximum(1 - (short / long) ** 2, 0) / (1 + short**2))
+        ahead = np.sqrt(range_m**2 - (side * off) ** 2)
+        centre = ahead[..., None] * cone.axis - (side * off)[..., None] * cone.short
+    return range_m, centre[..., 2], (short, long), centre
 
 
 def _half_angles(cone: Cone, begin: Start, flattening: Array | None) -> tuple[Array, Array]:
@@ -208,6 +223,7 @@ METHOD = Method(
     example=example,
     button="Disc",
     start=start,
+    place=place,
     prepare=prepare,
     most_draws=100_000,
     notes=notes,

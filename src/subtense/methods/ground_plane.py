@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Array, Codes
 from ..camera import Camera
-from ..ground import Standing, ground_notes, meet, nothing, stand, with_standing
+from ..ground import Met, Standing, ground_notes, meet, nothing, stand, with_standing
 from ..method import Method, Output
 from ..observation import Observation
 from ..quantity import Note, Quantity
@@ -30,10 +30,12 @@ class Inputs(Standing):
     Attributes:
         foot: the point.
         point_height: of the point above the ground, m; 0.
+        above: how far straight above that point what is wanted is, m; 0.
     """
 
     foot: Observation = field(metadata={"points": 1})
     point_height: Quantity = field(default_factory=nothing, metadata={"unit": "m", "signed": True})
+    above: Quantity = field(default_factory=nothing, metadata={"unit": "m", "signed": True})
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,26 @@ def ground_plane(inputs: Inputs) -> Result:
 
     Source: similar triangles on bent, sloping ground; see `ground`.
     """
+    met, up = _met(inputs)
+    if not np.any(inputs.above.value):
+        return Result(met.ground_distance_m[..., 0], met.range_m[..., 0], met.depth_m[..., 0], met.worst)
+    above = np.asarray(inputs.above.value)
+    level, depth = met.ground_distance_m[..., 0], met.depth_m[..., 0] + above * up[..., 2]
+    return Result(level, np.hypot(level, met.z_m[..., 0] + above), depth, met.worst)
+
+
+def place(inputs: Inputs) -> Array:
+    """(..., 3) what is wanted, in the camera's frame, m."""
+    met, up = _met(inputs)
+    there = inputs.camera.rays(inputs.foot.points_px)[..., 0, :] * met.range_m
+    return np.asarray(there + np.asarray(inputs.above.value)[..., None] * up)
+
+
+def _met(inputs: Inputs) -> tuple[Met, Array]:
+    """Where the line of sight meets the ground, and which way is up."""
+    found = stand(inputs)
     rays = inputs.camera.rays(inputs.foot.points_px)
-    met = meet(inputs, stand(inputs), rays, np.asarray(inputs.point_height.value)[..., None])
-    return Result(met.ground_distance_m[..., 0], met.range_m[..., 0], met.depth_m[..., 0], met.worst)
+    return meet(inputs, found, rays, np.asarray(inputs.point_height.value)[..., None]), found.level.up
 
 
 def notes(inputs: Inputs, _: Result) -> tuple[Note, ...]:
@@ -87,5 +106,5 @@ METHOD = Method(
     example=example,
     most_draws=200_000,
     button="Ground point",
-    notes=notes,
+    place=place, notes=notes,
 )  # fmt: skip

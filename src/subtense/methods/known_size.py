@@ -59,15 +59,7 @@ def known_size(inputs: Inputs) -> Result:
 
     Source: similar triangles; see the module.
     """
-    x, y = inputs.camera.slopes(inputs.ends.points_px)
-    ax, ay = x[..., 1] - x[..., 0], y[..., 1] - y[..., 0]
-    bx, by = (x[..., 0] + x[..., 1]) * 0.5, (y[..., 0] + y[..., 1]) * 0.5
-    size, nominal_m = np.asarray(inputs.size.value), inputs.camera.nominal_focal_m
-    depth, half_step = segment_depth(ax, ay, bx, by, size, np.asarray(inputs.tilt.value))
-    depth_m = depth + np.asarray(inputs.focus.value) * nominal_m if nominal_m else depth
-    if np.any(half_step):  # the middle of the 3-D segment: Z b + (half step) a / 2, at depth Z
-        shift = half_step / (2 * depth)
-        bx, by = bx + shift * ax, by + shift * ay
+    size, (ax, ay), (bx, by), depth, depth_m = _middle(inputs)
     range_m = depth_m * np.sqrt(1 + bx * bx + by * by)
     if LENSES[inputs.camera.lens].perspective and depth_m.min(initial=np.inf) > 0 and range_m.max(initial=0.0) < np.inf:
         return Result(range_m, depth_m, np.zeros(range_m.shape, np.int8))  # nothing went wrong: the usual case
@@ -78,6 +70,26 @@ def known_size(inputs: Inputs) -> Result:
         (~np.isfinite(depth), Reason.TOO_OBLIQUE), (~(depth_m > 0), Reason.BEHIND_CAMERA),
     )  # fmt: skip
     return Result(range_m, depth_m, code)
+
+
+def _middle(inputs: Inputs) -> tuple[Array, tuple[Array, Array], tuple[Array, Array], Array, Array]:
+    """The size, the slopes between the ends and of the object's middle, its depth at infinite focus, and as focused."""
+    x, y = inputs.camera.slopes(inputs.ends.points_px)
+    ax, ay = x[..., 1] - x[..., 0], y[..., 1] - y[..., 0]
+    bx, by = (x[..., 0] + x[..., 1]) * 0.5, (y[..., 0] + y[..., 1]) * 0.5
+    size, nominal_m = np.asarray(inputs.size.value), inputs.camera.nominal_focal_m
+    depth, half_step = segment_depth(ax, ay, bx, by, size, np.asarray(inputs.tilt.value))
+    depth_m = depth + np.asarray(inputs.focus.value) * nominal_m if nominal_m else depth
+    if np.any(half_step):  # the middle of the 3-D segment: Z b + (half step) a / 2, at depth Z
+        shift = half_step / (2 * depth)
+        bx, by = bx + shift * ax, by + shift * ay
+    return size, (ax, ay), (bx, by), depth, depth_m
+
+
+def place(inputs: Inputs) -> Array:
+    """(..., 3) the object's middle in the camera's frame, m."""
+    _, _, (bx, by), _, depth_m = _middle(inputs)
+    return np.stack(np.broadcast_arrays(bx * depth_m, by * depth_m, depth_m), -1)
 
 
 def derivative(inputs: Inputs, result: Result) -> dict[str, dict[tuple[str, str], tuple[Array, ...]]] | None:
@@ -166,5 +178,6 @@ METHOD = Method(
     button="Known size",
     derivative=derivative,
     prepare=prepare,
+    place=place,
     notes=notes,
 )  # fmt: skip

@@ -118,6 +118,13 @@ def _numbers(begin: Pose, inputs: Inputs, view: FlatView) -> tuple[Array, Array,
         return depth * np.sqrt(1 + x * x + y * y), depth, abs(over)
 
 
+def place(inputs: Inputs, begin: FlatView) -> Array:
+    """(..., 3) the point in the camera's frame, m."""
+    return np.asarray(
+        inputs.camera.rays(inputs.spot.points_px)[..., 0, :] * plane_distance(inputs, begin).range_m[..., None]
+    )
+
+
 def prepare(inputs: Inputs) -> Inputs:
     """Inputs whose `ambiguity` holds the second pose's weight, where it has any."""
     weight = _weight(start(inputs))
@@ -177,5 +184,5 @@ METHOD = Method(
     assumes=("the reference points have the places that are stated, and lie in one plane", "the point lies in that plane",
              "the picture is not cropped or edited after the camera's numbers were taken"),
     source="R. Hartley, A. Zisserman, Multiple View Geometry, 8.1.1", typical="0.3 to 2 %", example=example,
-    button="Plane distance", prepare=prepare, start=start, notes=notes,
+    button="Plane distance", prepare=prepare, start=start, place=place, notes=notes,
 )  # fmt: skip

@@ -232,8 +232,7 @@ def pose(inputs: Inputs, begin: Start) -> Result:
 
     Source: reprojection least squares; see the module.
     """
-    lead = np.broadcast_shapes(inputs.points.leading, inputs.camera.leading, inputs.target.leading,
-                               np.shape(inputs.focus.value), np.shape(inputs.ambiguity.value))  # fmt: skip
+    lead = _leading(inputs)
     if not begin.poses:
         nothing = np.full(lead, np.nan)
         return Result(nothing, nothing, nothing, np.full(lead, Reason.NOT_CONVERGED, np.int8))
@@ -250,16 +249,39 @@ def pose(inputs: Inputs, begin: Start) -> Result:
     return Result(range_m, depth_m, tilt, code)
 
 
-def _numbers(begin: Pose, inputs: Inputs, seen: Array, whiten: Array) -> tuple[Array, Array, Array]:
-    """Range, depth and tilt from one start."""
+def _leading(inputs: Inputs) -> tuple[int, ...]:
+    return np.broadcast_shapes(inputs.points.leading, inputs.camera.leading, inputs.target.leading,
+                               np.shape(inputs.focus.value), np.shape(inputs.ambiguity.value))  # fmt: skip
+
+
+def place(inputs: Inputs, begin: Start) -> Array:
+    """(..., 3) the target's middle in the camera's frame, m."""
+    lead = _leading(inputs)
+    if not begin.poses:
+        return np.full((*lead, 3), np.nan)
+    seen = _normalised(inputs.camera, inputs.points)
+    share = np.asarray(inputs.ambiguity.value)[..., None]
+    middle, _ = _middle(begin.poses[0], inputs, seen, begin.whiten)
+    if len(begin.poses) > 1 and (np.any(share) or np.any(inputs.ambiguity.u)):
+        middle = (1 - share) * middle + share * _middle(begin.poses[1], inputs, seen, begin.whiten)[0]
+    return np.broadcast_to(middle, (*lead, 3))
+
+
+def _middle(begin: Pose, inputs: Inputs, seen: Array, whiten: Array) -> tuple[Array, Array]:
+    """The target's middle and the normal of its face, (..., 3) each, from one start."""
     points = inputs.target.points_m
     placed = _refined(begin, points, seen, whiten, STEPS)
     middle = placed.apply(points.mean(axis=-2, keepdims=True))[..., 0, :]
     extension = np.asarray(inputs.focus.value) * (inputs.camera.nominal_focal_m or 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        middle = middle * (1 + extension / middle[..., 2])[..., None]
+        return middle * (1 + extension / middle[..., 2])[..., None], placed.rotation[..., :, 2]
+
+
+def _numbers(begin: Pose, inputs: Inputs, seen: Array, whiten: Array) -> tuple[Array, Array, Array]:
+    """Range, depth and tilt from one start."""
+    middle, face = _middle(begin, inputs, seen, whiten)
+    with np.errstate(divide="ignore", invalid="ignore"):
         range_m = np.sqrt(np.sum(middle**2, -1))
-        face = placed.rotation[..., :, 2]
         along = abs(np.sum(face * middle, -1)) / range_m
         across = np.sqrt(np.sum(np.cross(face, middle) ** 2, -1)) / range_m
     return range_m, middle[..., 2], np.arctan2(across, along)
@@ -328,6 +350,7 @@ METHOD = Method(
     example=example,
     button="Rectangle",
     start=start,
+    place=place,
     prepare=prepare,
     most_draws=100_000,
     notes=notes,

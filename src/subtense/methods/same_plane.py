@@ -152,22 +152,33 @@ def same_plane_distance(inputs: DistanceInputs) -> Distance:
 
     Source: the plane is where the reference has its length; see the module.
     """
+    middle, known, facing = _middle(inputs)
+    range_m, depth = np.sqrt(np.sum(middle * middle, -1)), middle[..., 2]
+    perspective = np.asarray(not LENSES[inputs.camera.lens].perspective)
+    code = reasons(
+        depth.shape, (perspective, Reason.NOT_PINHOLE), (~facing, Reason.TOO_OBLIQUE),
+        (~(np.asarray(inputs.length.value) > 0), Reason.OUT_OF_RANGE), (known == 0, Reason.ZERO_EXTENT),
+        (~np.isfinite(depth), Reason.NOT_INVERTIBLE),
+    )  # fmt: skip
+    return Distance(range_m, depth, code)
+
+
+def place(inputs: DistanceInputs) -> Array:
+    """(..., 3) the middle of both ends in the camera's frame, m."""
+    return _middle(inputs)[0]
+
+
+def _middle(inputs: DistanceInputs) -> tuple[Array, Array, Bools]:
+    """The middle of both ends (..., 3), the reference's length in plane distances, and whether the plane faces the camera."""
     p, q = np.tan(np.asarray(inputs.turn.value)), np.tan(np.asarray(inputs.tip.value))
     known, known_facing = _length(inputs.camera, inputs.reference.points_px, p, q)
     slope_x, slope_y = inputs.camera.slopes(inputs.ends.points_px)
     along = 1 + p[..., None] * slope_x + q[..., None] * slope_y
     with np.errstate(divide="ignore", invalid="ignore"):
         z = (np.asarray(inputs.length.value) / known)[..., None] / along
-        x, y, depth = (np.mean(c, axis=-1) for c in (slope_x * z, slope_y * z, z))
-        farther = 1 + np.asarray(inputs.focus.value) * (inputs.camera.nominal_focal_m or 0.0) / depth
-        range_m, depth = np.sqrt(x * x + y * y + depth * depth) * farther, depth * farther
-    perspective = np.asarray(not LENSES[inputs.camera.lens].perspective)
-    code = reasons(
-        depth.shape, (perspective, Reason.NOT_PINHOLE), (~(known_facing & np.all(~(along <= 0), axis=-1)), Reason.TOO_OBLIQUE),
-        (~(np.asarray(inputs.length.value) > 0), Reason.OUT_OF_RANGE), (known == 0, Reason.ZERO_EXTENT),
-        (~np.isfinite(depth), Reason.NOT_INVERTIBLE),
-    )  # fmt: skip
-    return Distance(range_m, depth, code)
+        middle = np.stack([np.mean(c, axis=-1) for c in np.broadcast_arrays(slope_x * z, slope_y * z, z)], -1)
+        farther = 1 + np.asarray(inputs.focus.value) * (inputs.camera.nominal_focal_m or 0.0) / middle[..., 2]
+        return middle * farther[..., None], known, known_facing & np.all(~(along <= 0), axis=-1)
 
 
 def _length(camera: Camera | None, points_px: Array, p: Array, q: Array) -> tuple[Array, Bools]:
@@ -267,5 +278,6 @@ DISTANCE = Method(
     typical="1 to 3 % square to the plane, 2 to 6 % by eye",
     example=example_distance,
     button="Beside a reference",
+    place=place,
     notes=distance_notes,
 )  # fmt: skip

@@ -66,6 +66,12 @@ def start(inputs: Inputs) -> ConeFit:
     return rim_cone(inputs.camera, inputs.rim, round_one=True)
 
 
+def place(inputs: Inputs, begin: ConeFit) -> Array:
+    """(..., 3) the ball's centre in the camera's frame, m."""
+    cone, _ = refit(begin, inputs.camera.rays(inputs.rim.points_px))
+    return np.asarray(cone.axis * sphere(inputs, begin).range_m[..., None])
+
+
 def sphere(inputs: Inputs, begin: ConeFit) -> Result:
     """Range and depth of the ball's centre, m.
 
@@ -139,6 +145,7 @@ METHOD = Method(
     example=example,
     button="Ball",
     start=start,
+    place=place,
     prepare=prepare,
     most_draws=100_000,
     notes=notes,

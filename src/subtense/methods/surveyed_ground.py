@@ -106,6 +106,15 @@ def surveyed_ground(inputs: Inputs, begin: Resection | None) -> Result:
     return Result(np.asarray(t * np.hypot(ways[..., 0], ways[..., 1])), t, t * ray[..., 2], x, y, code)
 
 
+def place(inputs: Inputs, begin: Resection | None) -> Array:
+    """(..., 3) the point in the camera's frame, m."""
+    range_m = surveyed_ground(inputs, begin).range_m[..., None]
+    if begin is None:
+        return range_m + np.zeros(3)
+    camera, _ = moved(begin, inputs.camera, inputs.control.points_px, inputs.survey.points_m)
+    return np.asarray(camera.rays(inputs.foot.points_px)[..., 0, :] * range_m)
+
+
 def prepare(inputs: Inputs) -> Inputs:
     """Inputs whose surveyed points are as doubtful as their residuals show, where these are beyond chance."""
     if WIDENED in inputs.control.source:
@@ -171,6 +180,7 @@ METHOD = Method(
     example=example,
     button="Surveyed points",
     start=start,
+    place=place,
     prepare=prepare,
     most_draws=100_000,
     notes=notes,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -51,24 +51,62 @@ def measure(
         GeometryError: this view has no finite answer.
         DrawsNeeded: `draws` is 0, and without them an interval would be wrong.
     """
-    if not 0.5 <= level <= HIGHEST_LEVEL:
-        raise InputError("level", level, f"give a coverage from 0.5 to {HIGHEST_LEVEL}, as 0.95")
+    check_level(level)
     inputs = method.prepare(inputs)
     space = Space((inputs,))
+
+    def doubts() -> tuple[Note, ...]:
+        return method.notes(inputs, method.function(inputs, *((method.start(inputs),) if method.start else ())))
+
+    told = Told(method.name, level, label, given or {}, doubts)
+    return measure_model(model_of(method, inputs), space, method.outputs, told, seed=seed, draws=draws)
+
+
+def check_level(level: float) -> None:
+    """Raise for a coverage that no interval is given for."""
+    if not 0.5 <= level <= HIGHEST_LEVEL:
+        raise InputError("level", level, f"give a coverage from 0.5 to {HIGHEST_LEVEL}, as 0.95")
+
+
+@dataclass(frozen=True)
+class Told:
+    """What goes with the numbers of a measurement.
+
+    Attributes:
+        method: its name.
+        level: coverage of the intervals.
+        label: which thing is measured.
+        given: what to keep, to measure again.
+        notes: makes the doubts, once there is an answer.
+    """
+
+    method: str
+    level: float
+    label: str
+    given: Mapping[str, Any]
+    notes: Callable[[], tuple[Note, ...]]
+
+
+def measure_model(
+    model: Model, space: Space, outputs: Sequence[Output], told: Told, *, seed: int = 0, draws: int | None = None
+) -> tuple[Measurement, ...]:
+    """The outputs of a model of one scene as measurements, as `measure` does for a method.
+
+    Raises:
+        GeometryError, DrawsNeeded: as `measure`.
+    """
     if space.leading:
         raise InputError("inputs", f"with leading axes {space.leading}", "one scene at a time; use rows() for many")
-    model = model_of(method, inputs)
-    nominal = scene(model, space, level)
+    nominal = scene(model, space, told.level)
     if nominal.reason:
         reason = Reason(int(nominal.reason))
         raise GeometryError(reason.text, code=reason.name.lower())
-    result = method.function(inputs, *((method.start(inputs),) if method.start else ()))
-    notes = method.notes(inputs, result)
-    answers = _answers(method, model, space, nominal, level, seed, draws)
+    notes = told.notes()
+    answers = _answers(outputs, model, space, nominal, told.level, seed, draws)
     budgets = _budgets(space.lines, nominal, answers)
     return tuple(
-        _measurement(output, value, answer, budget, method.name, level, label, notes, given or {})
-        for output, value, answer, budget in zip(method.outputs, nominal.value.tolist(), answers, budgets, strict=True)
+        _measurement(output, value, answer, budget, told.method, told.level, told.label, notes, told.given)
+        for output, value, answer, budget in zip(outputs, nominal.value.tolist(), answers, budgets, strict=True)
     )
 
 
@@ -84,26 +122,32 @@ class _Answer:
 
 
 def _answers(
-    method: Method, model: Model, space: Space, nominal: Propagated, level: float, seed: int, draws: int | None
+    outputs: Sequence[Output],
+    model: Model,
+    space: Space,
+    nominal: Propagated,
+    level: float,
+    seed: int,
+    draws: int | None,
 ) -> list[_Answer]:
     """One for each output, by draws where nothing cheaper will do."""
     mapped = _Mapped(model, space, level)
     found: dict[int, _Answer] = {}
-    for o, output in enumerate(method.outputs):
+    for o, output in enumerate(outputs):
         answer = _without_draws(nominal, o, output.digits, mapped)
         if answer is not None:
             found[o] = answer
-    bent = [o for o in range(len(method.outputs)) if o not in found]
+    bent = [o for o in range(len(outputs)) if o not in found]
     if bent and draws == 0:
         raise DrawsNeeded
     if bent:
         from .draws import adaptive, sample_space  # many measurements need none
 
-        digits = max(method.outputs[o].digits for o in bent)
+        digits = max(outputs[o].digits for o in bent)
         fixed = None if draws is None else sample_space(model, space, draws, np.random.default_rng(seed)).of(bent)
         drawn = fixed or adaptive(model, space, level, seed, bent, digits)
-        found |= {o: _drawn(drawn, row, level, method.outputs[o]) for row, o in enumerate(bent)}
-    return [found[o] for o in range(len(method.outputs))]
+        found |= {o: _drawn(drawn, row, level, outputs[o]) for row, o in enumerate(bent)}
+    return [found[o] for o in range(len(outputs))]
 
 
 def _without_draws(nominal: Propagated, o: int, digits: int, mapped: _Mapped) -> _Answer | None:
