@@ -7,7 +7,7 @@ import pytest
 
 SOURCE = Path(__file__).parent.parent / "src" / "subtense"
 WAYS = {"camera_sources", "detectors", "methods", "reports"}
-FACES = {"cli", "web", "batch"}
+FACES = {"cli", "commands", "web", "batch"}
 BASE = {"errors", "arrays", "distribution", "quantity", "noun", "space", "propagate", "geometry", "method"}
 HEAVY = {
     "cv2",

@@ -22,8 +22,23 @@ if TYPE_CHECKING:
     from .quantity import Quantity
 
 
+_ELSEWHERE = {"triangulate": "scenes"}
+"""Commands by the module of `commands` that has them; it is loaded when one of them is asked for."""
+
+
 class _Group(click.Group):
     """Turns our errors into one line and their exit code; anything else keeps its traceback."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted({*super().list_commands(ctx), *_ELSEWHERE})
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in _ELSEWHERE:
+            return super().get_command(ctx, cmd_name)
+        from importlib import import_module
+
+        found: click.Command = getattr(import_module(f".commands.{_ELSEWHERE[cmd_name]}", __package__), cmd_name)
+        return found
 
     def invoke(self, ctx: click.Context) -> Any:
         try:

@@ -31,6 +31,8 @@ class Reason(enum.IntEnum):
     NO_HEIGHT = 12
     AT_OR_ABOVE_HORIZON = 13
     UPSIDE_DOWN = 14
+    NO_BASELINE = 16
+    PARALLEL_RAYS = 17
 
     @property
     def text(self) -> str:
@@ -77,6 +79,8 @@ _REASONS: dict[Reason, tuple[str, bool]] = {
         "base and top are exchanged: the first point is the base on the plane, the second the top",
         False,
     ),
+    Reason.NO_BASELINE: ("the first two pictures of the point were taken from one place, which tells no distance", False),
+    Reason.PARALLEL_RAYS: ("the lines of sight do not meet in front of the cameras: they are parallel, or part", True),
 }
 
 Partials = tuple[Array, ...]

@@ -25,6 +25,7 @@ TITLES = {
     "far_width": "along the upper edge",
     "position_x": "place, x",
     "position_y": "place, y",
+    "position_z": "place, z",
     "object_scale_along": "mm per pixel, along the columns",
     "size": "real size",
     "extent": "extent in the picture",

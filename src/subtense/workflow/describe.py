@@ -12,6 +12,7 @@ from ..noun import Noun
 from ..observation import Observation
 from ..quantity import Quantity
 from ..target import Target
+from ..views import Track, Views
 from .given import given, noun_types
 from .tables import DETECTORS, METHODS
 
@@ -45,6 +46,18 @@ NOUNS: dict[type, dict[str, Any]] = {
         "properties": {"width_px": {"type": "integer", "minimum": 1}, "height_px": {"type": "integer", "minimum": 1},
                        "f_px": _NUMBER, "cx_px": _NUMBER, "cy_px": _NUMBER, "aspect": _NUMBER, "lens": _TEXT,
                        "distortion": _NUMBERS, "cov": {"type": ["array", "null"], "items": _NUMBERS}},
+    },
+    Views: {
+        "required": ["names", "cameras", "rotation", "centre_m"],
+        "properties": {"names": {"type": "array", "items": _TEXT}, "cameras": {"type": "array", "items": {"type": "object"}},
+                       "rotation": {"type": "array"}, "centre_m": {"type": "array", "items": _NUMBERS},
+                       "camera_of": {"type": ["array", "null"], "items": {"type": "integer", "minimum": 0}},
+                       "cov": {"type": ["array", "null"], "items": _NUMBERS}, "u_scale": {"type": "number", "minimum": 0},
+                       "source": _TEXT, "scale_source": _TEXT, "id": _TEXT},
+    },
+    Track: {
+        "required": ["names", "seen"],
+        "properties": {"names": {"type": "array", "items": _TEXT}, "seen": {"type": "object"}, "id": _TEXT},
     },
 }  # fmt: skip
 """The JSON of each noun, as `to_json` writes it."""

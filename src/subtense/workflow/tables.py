@@ -26,6 +26,7 @@ from ..methods import (
     same_plane,
     sphere,
     surveyed_ground,
+    triangulation,
     wall,
 )
 from ..photo import Photo
@@ -55,6 +56,9 @@ METHODS: dict[str, Method] = {
         plane_distance.METHOD,
         height.METHOD,
         wall.METHOD,
+        triangulation.METHOD,
+        triangulation.LENGTH,
+        triangulation.CAMERAS,
     )
 }
 """Ways to measure, by name."""
