@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -145,3 +146,59 @@ def test_points_that_do_not_fit_are_noted():
     found = propagate.measure(pose.METHOD, wrong)[0]
     assert "points_misfit" in {n.code for n in found.notes}
     assert abs(found.value - 0.7) > 3 * found.u  # what the note is for
+
+
+def nominal(camera: Camera) -> Camera:
+    """The camera as its maker states it."""
+    return Camera(camera.width_px, camera.height_px, 1300.0, 799.5, 599.5,
+                  cov=np.diag([(0.015 * 1300.0) ** 2, 0.0, 8.0**2, 8.0**2]))  # fmt: skip
+
+
+def misfits(camera, target, points_px, sigma) -> bool:
+    inputs = pose.Inputs(camera, Observation(points_px, sigma), target)
+    return "points_misfit" in {n.code for n in pose.notes(inputs, pose.pose(inputs, pose.start(inputs)))}
+
+
+@pytest.mark.opencv
+def test_a_focal_length_that_is_off_by_what_is_stated_is_no_misfit():
+    """Accurate corners of a large, steep sheet show that the focal length is off; that is no fault of the points."""
+    rng, sheet = np.random.default_rng(8), Target.square(Quantity.exact(0.25, "m"), "sheet")
+    noted, noted_by_points_alone = 0, 0
+    for scene, sign in enumerate(rng.choice([-1, 1], 300)):
+        camera = Camera(1600, 1200, 1300.0 * (1 + 0.015 * sign), 799.5, 599.5)
+        turn = rotation_from_vector(np.array([0.0, 0.0, rng.uniform(-3, 3)]))
+        tilt, z = rng.uniform(0.8, 1.3), rng.uniform(0.4, 0.9)
+        there = Pose(turn @ rotation_from_vector(np.array([tilt, 0, 0])) @ turn.T, np.array([0.1 * z, -0.1 * z, z]))
+        clicks = camera.project(there.apply(sheet.points_m)) + rng.normal(0, 0.05, (4, 2))
+        noted += misfits(nominal(camera), sheet, clicks, 0.05)
+        noted_by_points_alone += scene < 50 and misfits(
+            dataclasses.replace(nominal(camera), cov=None), sheet, clicks, 0.05
+        )
+    assert noted <= 3
+    assert noted_by_points_alone > 35  # what is stated of the camera makes the difference
+
+
+@pytest.mark.opencv
+@pytest.mark.parametrize("vector", [(0.9, 0.1, 0.05), (0.1, 0.05, 0.3), (-0.5, 0.7, 1.0)])
+def test_a_nominal_focal_length_hides_neither_exchanged_sides_nor_a_wrong_corner(vector):
+    camera, q = Camera(1600, 1200, 1290.0, 799.5, 599.5), Quantity.normal
+    sheet, other = (
+        Target.rectangle(q(w, 1e-4, "m"), q(h, 1e-4, "m"), "sheet") for w, h in ((0.21, 0.297), (0.297, 0.21))
+    )
+    there = Pose(rotation_from_vector(np.array(vector)), np.array([0.0, 0.02, 0.8]))
+    clicks = camera.project(there.apply(sheet.points_m)) + np.random.default_rng(3).normal(0, 0.3, (4, 2))
+    wrong = clicks + np.array([[0, 0], [-25.0, 15.0], [0, 0], [0, 0]])  # along the diagonal it would look like a tilt
+    assert not misfits(nominal(camera), sheet, clicks, 0.3)
+    assert misfits(nominal(camera), other, clicks, 0.3)
+    assert misfits(nominal(camera), sheet, wrong, 0.3)
+
+
+@pytest.mark.opencv
+def test_a_target_whose_places_are_doubtful_fits_within_their_doubt():
+    """Corners measured with a tape to 5 mm do not fit a tenth of a pixel."""
+    rng = np.random.default_rng(2)
+    places = MARKER.points_m * 20
+    doubtful = Target("court", places, sigma_m=0.005)
+    inputs = seen((0.8, 0.2, 0.1), (0.2, 0.1, 3.0), Target("court", places + rng.normal(0, 0.005, places.shape)))
+    assert not misfits(inputs.camera, doubtful, inputs.points.points_px, 0.1)
+    assert misfits(inputs.camera, Target("court", places), inputs.points.points_px, 0.1)

@@ -2,7 +2,9 @@
 
 A start is found by OpenCV (IPPE for flat targets, SQPNP else), and refined by Gauss-Newton on the normalised image plane
 with the observation's covariance. A flat target has two solutions; where the pixels can't tell them apart, the second
-enters with its weight exp(-chi^2 / 2) as a line of the budget. A nominal focal length makes the target too near by about
+enters with its weight exp(-chi^2 / 2) as a line of the budget. That chi^2, which also says whether the points fit the target
+at all, weighs the residuals by all that is stated of points, camera and target, for a focal length that is a little wrong bends
+them much more than accurate corners may err. A nominal focal length makes the target too near by about
 f (thin lens), which `focus` says how much of to add.
 
 Source: T. Collins, A. Bartoli, Infinitesimal plane-based pose estimation, IJCV 2014; G. Terzakis, M. Lourakis, SQPnP, 2020.
@@ -11,6 +13,7 @@ Source: T. Collins, A. Bartoli, Infinitesimal plane-based pose estimation, IJCV 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -24,6 +27,7 @@ from ..focus import close_focus, thin_lens
 from ..geometry import Pose, cross_matrix, rotation_from_vector
 from ..lenses import LENSES
 from ..method import Method, Output, Reason, reasons
+from ..noun import Part
 from ..observation import Observation
 from ..quantity import Note, Quantity
 from ..target import Target
@@ -35,7 +39,9 @@ SETTLED = 1e-13
 TELLING_RAD = math.radians(3.0)
 """Two solutions whose faces differ by less are not called ambiguous."""
 MISFIT_Z = 4.75
-"""Normal quantile (1 in 1e6) beyond which residuals are no chance; a nominal focal length bends them a little too."""
+"""Normal quantile (1 in 1e6) beyond which residuals are no chance."""
+STEP = 0.1
+"""Of a standard deviation, by which stated numbers are moved to see how residuals follow."""
 LEAST_WEIGHT = 0.01
 """A second solution of less weight is left out."""
 
@@ -86,8 +92,8 @@ class Start:
 
     Attributes:
         poses: camera_from_target, one or two.
-        whiten: (2N, 2N), so that whitened residuals have unit variance.
-        chi2: of each solution.
+        whiten: (2N, 2N), so that residuals whitened have unit variance as far as the points err.
+        chi2: of each solution, by all that is stated of points, camera and target; the camera and the pose are fitted to it.
     """
 
     poses: tuple[Pose, ...]
@@ -114,18 +120,27 @@ def start(inputs: Inputs) -> Start:
     points, seen = inputs.target.points_m, _normalised(inputs.camera, inputs.points)
     if not np.all(np.isfinite(seen)):
         return Start((), np.eye(seen.size), ())
-    whiten = _whitening(inputs)
-    found: list[tuple[float, Pose]] = []
+    cov = _points_cov(inputs)
+    whiten, found = _whitening(cov), list[tuple[float, Pose]]()
     for pose in _closed_form(points, seen):
         for candidate in (pose, _mirrored(pose, points)):
             refined = _refined(candidate, points, seen, whiten, 20)
-            residual = whiten @ (_seen_at(refined, points) - seen).reshape(-1)
-            chi2 = float(residual @ residual)
+            chi2 = _chi2(refined, points, seen, whiten)
             fits = np.isfinite(chi2) and np.all(refined.apply(points)[..., 2] > 0)
             if fits and not any(_same(refined, other) for _, other in found):
                 found.append((chi2, refined))
+    if not found:
+        return Start((), whiten, ())
     best = sorted(found, key=lambda pair: pair[0])[:2]
+    whole = _whitening(cov + _moved_cov(inputs, best[0][1]))
+    fitted = [(_chi2(_refined(pose, points, seen, whole, STEPS), points, seen, whole), pose) for _, pose in best]
+    best = sorted(fitted, key=lambda pair: pair[0])
     return Start(tuple(p for _, p in best), whiten, tuple(c for c, _ in best))
+
+
+def _chi2(pose: Pose, points_m: Array, seen: Array, whiten: Array) -> float:
+    residual = whiten @ (_seen_at(pose, points_m) - seen).reshape(-1)
+    return float(residual @ residual)
 
 
 def _same(one: Pose, other: Pose) -> bool:
@@ -151,13 +166,41 @@ def _normalised(camera: Camera, points: Observation) -> Array:
     return np.stack(camera.slopes(points.points_px), -1)
 
 
-def _whitening(inputs: Inputs) -> Array:
-    """Inverse Cholesky root of the points' covariance, in normalised coordinates (pixels over f)."""
+def _points_cov(inputs: Inputs) -> Array:
+    """(2N, 2N) covariance of the points, in normalised coordinates (pixels over f)."""
     f = float(np.mean(inputs.camera.f_px))
     points = inputs.points
     cov = points.cov if points.cov is not None else np.diag(np.maximum(points.standard_deviations, 1e-3) ** 2)
-    floor = 1e-6 * np.eye(len(cov))
-    return np.asarray(np.linalg.inv(np.linalg.cholesky((cov + floor) / f**2)))
+    return np.asarray((cov + 1e-6 * np.eye(len(cov))) / f**2)
+
+
+def _whitening(cov: Array) -> Array:
+    """Inverse Cholesky root."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(cov)))
+
+
+def _moved_cov(inputs: Inputs, at: Pose) -> Array:
+    """(2N, 2N) covariance of the normalised residuals by what is stated of the camera's numbers and the target's shape."""
+    camera, target = inputs.camera, inputs.target
+    cov = np.zeros((2 * inputs.points.points_px.shape[-2],) * 2)
+    for part in camera.parts():
+        cov += _by_part(part, lambda values: _normalised(camera.moved(values), inputs.points))
+    for part in target.parts():
+        cov += _by_part(part, lambda values: _seen_at(at, target.moved(values).points_m))
+    return cov
+
+
+def _by_part(part: Part, residual: Callable[[dict[str, Array]], Array]) -> Array:
+    """(2N, 2N) covariance that one block of numbers gives to residuals, by central differences."""
+    u = np.sqrt(np.diag(part.cov)) if part.cov is not None else np.asarray(part.u, float).reshape(-1)
+    steps = STEP * np.diag(u)
+    up, down = (residual({part.key: part.value.reshape(-1, 1) + sign * steps}) for sign in (1, -1))
+    # rows: change with one u of each number, where a lens that was moved still gives directions
+    by_u = np.nan_to_num((up - down) / (2 * STEP), posinf=0.0, neginf=0.0).reshape(len(u), -1)
+    if part.cov is None:
+        return np.asarray(by_u.T @ by_u)
+    scale = np.where(u > 0, u, 1.0)
+    return np.asarray(by_u.T @ (part.cov / np.outer(scale, scale)) @ by_u)
 
 
 def _closed_form(points_m: Array, seen: Array) -> list[Pose]:
@@ -297,7 +340,7 @@ def prepare(inputs: Inputs) -> Inputs:
 
 
 def _misfit(inputs: Inputs, begin: Start) -> float:
-    """Residual of the better solution in what is stated of the points, where it is beyond chance; 0 else."""
+    """Residual of the better solution in what is stated of points, camera and target, where it is beyond chance; 0 else."""
     freedom = 2 * inputs.points.points_px.shape[-2] - 6
     spread = 2 / (9 * freedom)
     most = freedom * (1 - spread + MISFIT_Z * math.sqrt(spread)) ** 3  # Wilson and Hilferty's quantile of chi^2
@@ -311,9 +354,10 @@ def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
     found = []
     misfit = _misfit(inputs, begin)
     if misfit:
-        found.append(Note("points_misfit", f"the points do not fit the target: they are off by {misfit:.2g} times what is stated of "
-                          "them, and the interval is too narrow", "check that the points are those of the target in its order, which "
-                          "side is which, and the camera"))  # fmt: skip
+        text = (f"the points do not fit the target: they are off by {misfit:.2g} times what is stated of them and of the camera, "
+                "and the interval is too narrow")  # fmt: skip
+        cure = "check that the points are those of the target in its order, which side is which, and the camera"
+        found.append(Note("points_misfit", text, cure))
     if begin.weight >= LEAST_WEIGHT and begin.apart_rad > TELLING_RAD:
         other = _numbers(begin.poses[1], inputs, _normalised(inputs.camera, inputs.points), begin.whiten)
         text = (f"a second pose fits nearly as well (probability {begin.weight:.0%}): tilt {math.degrees(float(other[2])):.0f}° "
