@@ -214,6 +214,21 @@ def test_the_command_line_snaps(examples):
     assert found[1]["u"] < found[0]["u"] * 1.01
 
 
+def test_snapping_on_the_command_line_knows_the_curve(examples):
+    """An unknown curve moves both ends out or in together; a linear picture's edges lie elsewhere, and are known better."""
+    words = ["measure", str(examples / "belt.jpg"), "--line", "486,569,1014,571", "--size", "200 mm", "--snap"]
+
+    def ends(*more: str):
+        output = CliRunner().invoke(main, [*words, "--format", "json", *more], catch_exceptions=False).output
+        return json.loads(output)["measurements"][0]["given"]["ends"]
+
+    unknown, srgb, linear = ends(), ends("--curve", "srgb"), ends("--curve", "linear")
+    assert unknown["cov"][0][2] < -0.005 and srgb["cov"][0][2] == 0 and srgb["cov"][0][0] < unknown["cov"][0][0]
+    assert abs(linear["points_px"][0][0] - srgb["points_px"][0][0]) > 0.1
+    bad = CliRunner().invoke(main, [*words, "--curve", "x"])
+    assert bad.exit_code == 2 and "--curve" in bad.output
+
+
 def test_the_command_line_says_that_there_is_no_edge(tmp_path):
     path = tmp_path / "gray.png"
     Image.new("RGB", (300, 200), "gray").save(path)

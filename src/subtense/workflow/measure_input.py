@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from .. import assumptions
-from ..detection import unknown_curve
+from ..detection import parse_curve, unknown_curve
 from ..document import Document
 from ..errors import InputError
 from ..observation import Observation
@@ -30,7 +30,7 @@ def measure_document(
         sizes: of the lines, one for all or one each; without lines one, of things whose size nothing else tells.
         tilt: of the lines.
         marker_size: side of markers; with it alone, only markers are looked for.
-        asked: what to look for.
+        asked: what to look for, and the picture's transfer curve.
         camera: what the user said of it; None to go by the photo.
         level: coverage of the intervals.
         seed: of the draws.
@@ -41,7 +41,8 @@ def measure_document(
         NothingFoundError: nothing found, or nothing to snap to.
         InputError: a text that can't be read.
     """
-    asked = what_to_look_for(asked or Asked(), marker_size, lines)
+    told = asked or Asked()
+    asked = what_to_look_for(told, marker_size, lines)
     if lines and not sizes:
         raise InputError("--size", None, "give the real size of what the line spans, as --size '210 mm'")
     if len(sizes) > 1 and not lines:
@@ -55,7 +56,8 @@ def measure_document(
         )
         notes: list[tuple[Note, ...]] = []
         if snap:
-            ends, notes = snapped_lines(photo, ends, unknown_curve())
+            curve = unknown_curve() if told.curve is None else parse_curve(told.curve)
+            ends, notes = snapped_lines(photo, ends, curve)
         document = measure_lines(photo, ends, lengths, camera=camera, tilt=angle, level=level, seed=seed)
         found.append(with_line_notes(document, notes))
     if asked is not None:
