@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .quantity import Quantity
 
 
-_ELSEWHERE = {"triangulate": "scenes"}
+_ELSEWHERE = {"plan": "plan", "triangulate": "scenes"}
 """Commands by the module of `commands` that has them; it is loaded when one of them is asked for."""
 
 

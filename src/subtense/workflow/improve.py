@@ -17,6 +17,12 @@ CURES = (
     ("shape of the survey", "survey the points more closely"),
     ("focal length", "calibrate the camera at this focus (20 pictures of a board), or measure one known distance"),
     ("pixel aspect", "calibrate the camera"),
+    ("baseline", "calibrate the pair at this focus, and keep it rigid"),
+    ("principal point difference", "calibrate the pair at this focus"),
+    (
+        "disparity",
+        "set the cameras farther apart, use a longer lens or more pixels, or match to a smaller part of a pixel",
+    ),
     ("principal point", "calibrate the camera, or keep the object near the middle of the picture"),
     ("lens distortion", "calibrate the camera, or keep the object near the middle of the picture"),
     ("sensor width", "look up the sensor's width to two decimals, or calibrate the camera"),
@@ -33,18 +39,22 @@ CURES = (
 """A word of a budget line's name, and what lessens that line; the first that fits is taken."""
 
 
+def cure_of(name: str) -> str:
+    """What lessens a line of a budget, by its name."""
+    return next((cure for word, cure in CURES if word in name), "state it more closely")
+
+
 def improve(m: Measurement) -> str:
     """One sentence: the largest line, what u would be without it, and what lessens it; empty where there is no budget."""
     if not m.budget or m.u is None:
         return ""
     top = m.budget[0]
-    cure = next((cure for word, cure in CURES if word in top.name), "state it more closely")
     name, factor = fitting_unit(m.value, m.unit)
     rest = m.u * math.sqrt(max(1 - top.share, 0.0)) / factor
     now = m.u / factor
     less = f"{grouped(rest, max(digits_for(rest), 0))}" if rest > 1e-4 * now else "next to 0"
     saving = f"without it u would be {less} instead of {grouped(now, max(digits_for(now), 0))} {name}"
-    return f"{top.name} makes {100 * top.share:.0f} % of the variance ({saving}): {cure}."
+    return f"{top.name} makes {100 * top.share:.0f} % of the variance ({saving}): {cure_of(top.name)}."
 
 
 def improved(measurements: tuple[Measurement, ...]) -> tuple[Measurement, ...]:
