@@ -31,6 +31,7 @@ class Reason(enum.IntEnum):
     NO_HEIGHT = 12
     AT_OR_ABOVE_HORIZON = 13
     UPSIDE_DOWN = 14
+    NO_PARALLAX = 15
     NO_BASELINE = 16
     PARALLEL_RAYS = 17
 
@@ -73,6 +74,10 @@ _REASONS: dict[Reason, tuple[str, bool]] = {
     ),
     Reason.AT_OR_ABOVE_HORIZON: (
         "a point lies at or above the horizon of the ground: its pitch, its slope or the point is wrong, or it is no ground",
+        True,
+    ),
+    Reason.NO_PARALLAX: (
+        "the two pictures show the point where they would show it infinitely far away, or beyond that: its disparity is too small",
         True,
     ),
     Reason.UPSIDE_DOWN: (

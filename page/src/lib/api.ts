@@ -64,7 +64,7 @@ export interface Photo {
 }
 export interface FieldSchema {
   description: string;
-  "x-noun"?: "Quantity" | "Observation" | "Target" | "Camera";
+  "x-noun"?: "Quantity" | "Observation" | "Target" | "Camera" | "Rig";
   "x-widget": string;
   "x-unit"?: string;
   "x-points"?: number;

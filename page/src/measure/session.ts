@@ -101,7 +101,9 @@ export function typedFields(method: MethodRow): { name: string; noun: string; un
 /** Whether a method measures by points in a picture that can be set, so that there is a tool for it. */
 export function isTool(method: MethodRow): boolean {
   const fields = pointFields(method);
-  return fields.length > 0 && fields.every((field) => field.count < Infinity || field.closed);
+  // two cameras are no single photo's
+  const rig = Object.values(method.inputs.properties).some((field) => field["x-noun"] === "Rig");
+  return !rig && fields.length > 0 && fields.every((field) => field.count < Infinity || field.closed);
 }
 
 /** The stated standard deviation of an end, px; undefined where nothing was said, null where it can't be read. */

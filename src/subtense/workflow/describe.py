@@ -10,6 +10,7 @@ from ..camera import Camera
 from ..method import Method
 from ..noun import Noun
 from ..observation import Observation
+from ..rig import Rig
 from ..quantity import Quantity
 from ..target import Target
 from ..views import Track, Views
@@ -46,6 +47,12 @@ NOUNS: dict[type, dict[str, Any]] = {
         "properties": {"width_px": {"type": "integer", "minimum": 1}, "height_px": {"type": "integer", "minimum": 1},
                        "f_px": _NUMBER, "cx_px": _NUMBER, "cy_px": _NUMBER, "aspect": _NUMBER, "lens": _TEXT,
                        "distortion": _NUMBERS, "cov": {"type": ["array", "null"], "items": _NUMBERS}},
+    },
+    Rig: {
+        "required": ["left", "right", "right_from_left", "cov"],
+        "properties": {"left": {"type": "object"}, "right": {"type": "object"}, "right_from_left": {"type": "object"},
+                       "cov": {"type": "array", "items": _NUMBERS}, "source": _TEXT, "part_sources": {"type": "object"},
+                       "id": _TEXT},
     },
     Views: {
         "required": ["names", "cameras", "rotation", "centre_m"],
