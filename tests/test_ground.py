@@ -344,7 +344,7 @@ def test_straight_down_and_straight_up():
 
 
 def test_nothing_too_many_and_outside():
-    with pytest.raises(InputError, match="--ground is missing"):
+    with pytest.raises(InputError, match="--point is missing"):
         document()
     with pytest.raises(InputError, match="10000 points"):
         document(";".join("800,700" for _ in range(10_000)))

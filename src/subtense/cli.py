@@ -11,18 +11,30 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from . import __version__
-from .errors import InputError, SubtenseError
+from .commands.ground import standing_options as _standing_options
+from .commands.ground import standing_texts as _standing_texts
+from .commands.options import output_options as _output_options
+from .commands.options import search_options as _search_options
+from .commands.options import searching as _searching
+from .commands.options import show as _show
+from .commands.options import write_overlay as _write_overlay
+from .errors import SubtenseError
 
 if TYPE_CHECKING:
     from .board import Board
     from .calibration import Calibration
-    from .document import Document
     from .method import Method
-    from .photo import Photo
     from .quantity import Quantity
 
 
-_ELSEWHERE = {"plan": "plan", "triangulate": "scenes"}
+_ELSEWHERE = {
+    "ground": "ground",
+    "fuse": "together",
+    "methods": "together",
+    "plan": "plan",
+    "triangulate": "scenes",
+    "plane": "plane",
+}
 """Commands by the module of `commands` that has them; it is loaded when one of them is asked for."""
 
 
@@ -63,31 +75,6 @@ def main() -> None:
     Lengths may carry a unit and a doubt: "5 m", "6 ft 2 in", "200 ± 0.5 mm". A bare ± is a 95 % half-width; write
     (1s) or (limits) behind it for a standard deviation or hard limits.
     """
-
-
-def _output_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """--format, --level, --seed: the same for every command that measures."""
-    for option in (
-        click.option("--seed", type=int, default=0, show_default=True, help="Seed of the Monte Carlo draws."),
-        click.option("--level", type=float, default=0.95, show_default=True, help="Coverage of the intervals."),
-        click.option("--report", "files", multiple=True, type=click.Path(path_type=Path),
-                     help="Write it to this file too: .pdf, .csv, .json, .txt, or .png where there is a photo."),
-        click.option("--format", "form", default="text", show_default=True, help="text, json or csv."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
-
-
-def _show(document: Document, form: str, files: tuple[Path, ...] = (), photo: Photo | None = None) -> None:
-    """Write the files, then print the document: text goes to the terminal, a picture or a PDF to a pipe."""
-    from .workflow.report_of import report_of, write_report
-
-    for file in files:
-        write_report(document, photo, file)
-    shown = report_of(form, photo=photo is not None).function(document, photo)
-    if isinstance(shown, bytes) and sys.stdout.isatty():
-        raise InputError("--format", form, f"{form} is no text for a terminal; write it to a file with --report")
-    click.echo(shown, nl=isinstance(shown, str))
 
 
 @main.command(epilog="Example: subtense calc --focal 35 --sensor-width 14.1 --image-width 4096 --size 200 --extent 150")
@@ -206,38 +193,6 @@ def convert(source: str, target: Path, from_form: str | None, to_form: str | Non
         click.echo(f"note: {_one_line(lost)}", err=True)
 
 
-def _search_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """What to look for: the same for `measure` and `detect`."""
-    for option in (
-        click.option("--thorough", is_flag=True, help="Look for small things even where larger ones are found."),
-        click.option("--model", type=click.Path(path_type=Path), metavar="FILE",
-                     help="Find objects with this ONNX network of the YOLO or DETR family instead."),
-        click.option("--curve", metavar="CURVE", help="From light to the picture's values: srgb, linear, or an exponent."
-                     "  [default: near srgb]"),
-        click.option("--marker-family", "family", metavar="NAME", help="Of markers, look for this family only, as 36h11 or 4x4."),
-        click.option("--target-file", type=click.Path(path_type=Path), metavar="FILE",
-                     help="More things of known size, from a TOML file of your own."),
-        click.option("--target", "targets", multiple=True, metavar="NAME",
-                     help="Look for this thing of known size, as a4, euro-1 or person; see `subtense targets`."),
-        click.option("--only", multiple=True, metavar="NAME",
-                     help="Look for markers, qr_codes, faces, objects, sheets or circles only."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
-
-
-@contextmanager
-def _searching() -> Iterator[Callable[[str, float], None]]:
-    """A bar on the terminal's error stream that says what is looked for; nothing where that is no terminal."""
-    with click.progressbar(length=1000, label="Looking", file=sys.stderr, hidden=not sys.stderr.isatty()) as bar:
-
-        def told(title: str, share: float) -> None:
-            bar.label = f"Looking for {title}"
-            bar.update(round(1000 * share) - bar.pos)
-
-        yield told
-
-
 @main.command(
     epilog="Examples: subtense measure examples/desk.jpg --marker-size '50 mm' --overlay out.png; subtense measure street.jpg"
 )
@@ -269,25 +224,37 @@ def _searching() -> Iterator[Callable[[str, float], None]]:
     "--marker-size", metavar="LENGTH", help="Find ArUco and AprilTag markers; side of the black square, mm if bare."
 )
 @_search_options
+@_standing_options
+@click.option(
+    "--between",
+    multiple=True,
+    metavar="A,B",
+    help="How far apart two things are, by their numbers or names in the report; or all.",
+)
+@click.option("--same", multiple=True, metavar="A,B", help="These things are one and the same: one number from them.")
 @click.option("--camera", metavar="CAMERA", help='A calibration file, "f=1500px", "f=35mm,sensor=14.1mm", "fov=70deg", or a preset.'
               "  [default: from the photo's metadata]")  # fmt: skip
 @click.option("--overlay", type=click.Path(path_type=Path), help="Write the photo with the result drawn on it.")
 @_output_options
 def measure(photo: Path, lines: tuple[str, ...], sizes: tuple[str, ...], outlines: tuple[str, ...], extent: str,
             outline_model: str | None, tilt: str | None, snap: bool, marker_size: str | None, camera: str | None,
-            overlay: Path | None, form: str, files: tuple[Path, ...], level: float, seed: int, **told: Any) -> None:  # fmt: skip
+            between: tuple[str, ...], same: tuple[str, ...], overlay: Path | None, form: str, files: tuple[Path, ...], level: float,
+            seed: int, **told: Any) -> None:  # fmt: skip
     """Measure in PHOTO: objects of known size by their ends, or everything that is found by itself.
 
-    Without --line or --outline it looks for markers, QR codes, sheets, faces, people, vehicles and more, and lists
-    each with its distance and what its size is taken to be. Pixel (0, 0) is the centre of the top-left pixel of the
-    upright picture.
+    Without --line or --outline it looks for markers, QR codes, sheets, faces, people, vehicles and more, and lists each
+    with its distance and what its size is taken to be. Where it is told how the camera stands (--height, --pitch), what
+    stands on the ground is ranged by that too: the better answer comes first, and the other is a check on it. Pixel
+    (0, 0) is the centre of the top-left pixel of the upright picture.
     """
     from .photo import Photo
     from .workflow.found import Asked
+    from .workflow.ground import GroundTexts
     from .workflow.measure_input import gray_will_do, measure_document
     from .workflow.report_of import report_of
 
     report_of(form)
+    ground = GroundTexts(**_standing_texts(told))
     asked = Asked(**told)
     shown = overlay is not None or bool(files) or bool(outlines)
     picture = Photo.load(photo, gray=not shown and gray_will_do(asked, marker_size, lines))
@@ -299,11 +266,9 @@ def measure(photo: Path, lines: tuple[str, ...], sizes: tuple[str, ...], outline
     else:
         with _searching() as progress:
             document = measure_document(picture, lines=lines, sizes=sizes, tilt=tilt, snap=snap, marker_size=marker_size,
-                                        asked=asked, camera=camera, level=level, seed=seed, progress=progress)  # fmt: skip
-    if overlay is not None:
-        from .reports.overlay import write
-
-        write(document, picture, overlay)
+                                        asked=asked, camera=camera, level=level, seed=seed, progress=progress, ground=ground,
+                                        between=between, same=same)  # fmt: skip
+    _write_overlay(document, picture, overlay)
     _show(document, form, files, picture)
 
 
@@ -381,7 +346,8 @@ class _Methods(click.Group):
 def method() -> None:
     """Any method by its own inputs: a camera, points, quantities, as text or @file.json.
 
-    Nothing is assumed here: every quantity needs its ±, or the word exact.
+    Nothing is assumed here: every quantity needs its ±, or the word exact. With --photo the camera is had from the picture,
+    and what is left out is assumed as in `measure`.
     """
 
 
@@ -399,16 +365,28 @@ def _method_command(found: Method) -> click.Command:
         ["--inputs"], type=click.Path(path_type=Path), help="All of them in a JSON file, as under `given`."
     )
 
+    in_photo = [
+        click.Option(["--photo"], type=click.Path(path_type=Path),
+                     help="The picture of the points; it tells the camera, or --camera does, and defaults are those of `measure`."),
+        click.Option(["--overlay"], type=click.Path(path_type=Path), help="Write the photo with the result drawn on it."),
+    ]  # fmt: skip
+
     @_output_options
     def run(
-        form: str, files: tuple[Path, ...], level: float, seed: int, inputs: Path | None, **texts: str | None
-    ) -> None:
+        form: str, files: tuple[Path, ...], level: float, seed: int, inputs: Path | None, photo: Path | None,
+        overlay: Path | None, **texts: str | None,
+    ) -> None:  # fmt: skip
+        from .photo import Photo
         from .workflow.measure import measure_inputs
 
         said = {k: v for k, v in texts.items() if v is not None}
-        _show(measure_inputs(found, inputs, said, level=level, seed=seed), form, files)
+        picture = None if photo is None else Photo.load(photo)
+        document = measure_inputs(found, inputs, said, photo=picture, level=level, seed=seed)
+        if picture is not None:
+            _write_overlay(document, picture, overlay)
+        _show(document, form, files, picture)
 
-    params = [*options, inputs, *reversed(run.__click_params__)]  # type: ignore[attr-defined]
+    params = [*options, inputs, *in_photo, *reversed(run.__click_params__)]  # type: ignore[attr-defined]
     text = f"{found.title[0].upper()}{found.title[1:]}.\n\n{found.needs}"
     return click.Command(found.name, params=params, callback=run, help=text)
 

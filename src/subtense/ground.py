@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -114,6 +114,9 @@ class Standing:
     cross_slope: Quantity = field(default_factory=level_ground, metadata={"unit": "rad", "signed": True})
     rise: Quantity = field(default_factory=nothing, metadata={"unit": "m", "signed": True})
     refraction: Quantity = field(default_factory=refraction, metadata={"unit": "1"})
+
+    one_of: ClassVar[tuple[tuple[str, ...], ...]] = (("pitch", "horizon", "parallels"), ("height", "reference"))
+    """Of each group one is needed."""
 
     def __post_init__(self) -> None:
         said = [name for name in ("pitch", "horizon", "parallels") if getattr(self, name) is not None]

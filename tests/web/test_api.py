@@ -663,8 +663,15 @@ def test_a_kind_that_nothing_finds_is_told_from_one_that_is_not_known(server, de
     name = next(t.name for t in targets().values() if not any(t.group in row.groups for row in DETECTORS.values()))
     found = error(server.client.post("/api/detect/all", json={"photo": desk["id"], "targets": [name]}))
     assert found["name"] == "targets" and "nothing finds it" in found["message"]
-    found = error(server.client.post("/api/detect/markers", json={"photo": desk["id"], "targets": ["cup"]}))
-    assert found["name"] == "targets"
+    found = error(server.client.post("/api/detect/all", json={"photo": desk["id"], "targets": ["no-such-thing"]}))
+    assert found["name"] == "targets" and "known are" in found["message"]
+
+
+def test_a_kind_that_is_said_is_looked_for_beside_the_detector_that_is_named(server, desk):
+    found = server.client.post("/api/detect/markers", json={"photo": desk["id"], "targets": ["cup"]}).json()[
+        "detections"
+    ]
+    assert {one["detector"] for one in found} == {"markers", "objects"}
 
 
 def test_a_missing_extra_of_a_child_keeps_its_status():

@@ -53,7 +53,7 @@ def measure(
     """
     check_level(level)
     inputs = method.prepare(inputs)
-    space = Space((inputs,))
+    space = one_scene((inputs,))
 
     def doubts() -> tuple[Note, ...]:
         return method.notes(inputs, method.function(inputs, *((method.start(inputs),) if method.start else ())))
@@ -66,6 +66,18 @@ def check_level(level: float) -> None:
     """Raise for a coverage that no interval is given for."""
     if not 0.5 <= level <= HIGHEST_LEVEL:
         raise InputError("level", level, f"give a coverage from 0.5 to {HIGHEST_LEVEL}, as 0.95")
+
+
+def one_scene(inputs: Sequence[Any]) -> Space:
+    """The space of the inputs of one scene.
+
+    Raises:
+        InputError: they have leading axes.
+    """
+    space = Space(inputs)
+    if space.leading:
+        raise InputError("inputs", f"with leading axes {space.leading}", "one scene at a time; use rows() for many")
+    return space
 
 
 @dataclass(frozen=True)
@@ -95,8 +107,6 @@ def measure_model(
     Raises:
         GeometryError, DrawsNeeded: as `measure`.
     """
-    if space.leading:
-        raise InputError("inputs", f"with leading axes {space.leading}", "one scene at a time; use rows() for many")
     nominal = scene(model, space, told.level)
     if nominal.reason:
         reason = Reason(int(nominal.reason))
@@ -219,6 +229,8 @@ def _quantiles(law: Distribution, low: float, high: float, count: int) -> Array:
 
 
 CURE = "make the pixel extent larger or better known: come closer, use a longer lens or a larger object"
+NOTHING = 1e-18
+"""Share of the variance that is rounding of numbers, and no line of a budget."""
 _HEAVY_TAIL = Note(
     "heavy_tail", "the far tail is so long that a standard deviation has no meaning; use the interval", CURE
 )
@@ -298,7 +310,7 @@ def _budget(
     found = [
         Contribution(line.name, line.source, math.copysign(math.sqrt(q), c), q / total)
         for line, c, q in zip(lines, signed, squared, strict=True)
-        if q > 0
+        if q > NOTHING * total
     ]
     rest = total - own
     if rest > 1e-9 * total:

@@ -16,7 +16,7 @@ from ..quantity import Measurement, Note, Quantity
 from ..space import Space
 from .differences import Propagated, scene
 from .draws import Draws, sample_space
-from .measurement import Told, check_level, measure_model
+from .measurement import Told, check_level, measure_model, one_scene
 from .model import Model, model_of
 
 Pairs = Sequence[tuple[Method, Any]]
@@ -116,7 +116,7 @@ def measure_together(
     """
     check_level(level)
     ready = prepared(pairs)
-    space = Space([inputs for _, inputs in ready])
+    space = one_scene([inputs for _, inputs in ready])
     told = Told(combination.name, level, label, given or {}, notes)
     return measure_model(combined_model(ready, combination), space, combination.outputs, told, seed=seed)
 

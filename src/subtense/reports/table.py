@@ -55,3 +55,8 @@ def sensor_table(sensors: Sequence[Sensor]) -> str:
         rows.append((s.name, f"{s.width_mm:.2f} x {s.height_mm:.2f} mm", f"{100 * s.u:.2g} %", f"{s.native_px[0]} x {s.native_px[1]}",
                      pitch, lens or "-", s.title))  # fmt: skip
     return columns(rows)
+
+
+def method_table(rows: Sequence[tuple[str, str, str, str]]) -> str:
+    """Name, what it measures, what it still needs, and title of methods."""
+    return columns([("name", "measures", "needs still", "how"), *rows])

@@ -43,6 +43,7 @@ TITLES = {
     "camera_height": "camera above the plane",
     "width": "its level part",
     "rise": "its upright part",
+    "depth_difference": "how much deeper the second is",
 }
 
 

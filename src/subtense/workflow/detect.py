@@ -47,6 +47,8 @@ WAYS: dict[str, Way] = {
 """By the shape of a detection."""
 
 
+SQUARE = "square"
+"""Name of the target where a person told the side of what was found."""
 SEARCHED_FINE_PX = 25.0
 """Size that a search should reach down to, or it is noted."""
 
@@ -172,7 +174,7 @@ def item_of(detection: Detection, size: Target | Quantity | str | None = None) -
     if told is None:
         return None
     if isinstance(told, Quantity) and way.size == "target":
-        told = Target.square(told, detection.label)
+        told = Target.square(told, SQUARE)  # of one name, so that what is told of all squares is one doubt
     inputs: dict[str, Any] = {way.points: detection.seen, way.size: told}
     if detection.tilt is not None and detection.shape == "length":
         inputs["tilt"] = detection.tilt
@@ -180,14 +182,18 @@ def item_of(detection: Detection, size: Target | Quantity | str | None = None) -
 
 
 def size_of(detection: Detection) -> Target | Quantity | None:
-    """The size of what it is taken to be, with where that comes from."""
+    """The size of what it is taken to be, with where that comes from; of each thing its own, as those of a kind differ."""
     known = detection.target
     if known is None:
         return None
     if known.width is not None and known.height is not None:
-        return Target.rectangle(known.width, known.height, known.title)
+        return dataclasses.replace(
+            Target.rectangle(known.width, known.height, known.title), id=f"size of {detection.label}"
+        )
     assert known.size is not None
-    return Target.square(known.size, known.title) if detection.shape == "square" else known.size
+    if detection.shape == "square":
+        return dataclasses.replace(Target.square(known.size, known.title), id=f"size of {detection.label}")
+    return dataclasses.replace(known.size)
 
 
 def detection_json(detection: Detection) -> dict[str, Any]:

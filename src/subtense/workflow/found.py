@@ -15,7 +15,7 @@ from ..photo import Photo
 from ..quantity import Quantity
 from ..targets import find_target
 from .detect import Found, detect, detectors_for
-from .measure import measure_detections
+from .measure import Standing, measure_detections
 from .resolve_camera import resolve_camera
 
 Progress = Callable[[str, float], None]
@@ -81,7 +81,8 @@ def _nothing(photo: Photo, asked: Asked, found: Found) -> NothingFoundError:
 
 def measured(
     photo: Photo, asked: Asked, *, size: Quantity | None = None, marker_size: Quantity | None = None,
-    camera: str | None = None, level: float = 0.95, seed: int = 0, progress: Progress | None = None,
+    camera: str | None = None, standing: Standing | None = None, level: float = 0.95, seed: int = 0,
+    progress: Progress | None = None,
 ) -> Document:  # fmt: skip
     """Everything that is found and whose size is known, told, or taken to be that of its kind, as one document.
 
@@ -91,6 +92,7 @@ def measured(
         size: of things that nothing else tells the size of: side, length or diameter, m.
         marker_size: side of markers' black square, m.
         camera: what the user said of it; None to go by the photo.
+        standing: how the camera stands above the ground.
         level: coverage of the intervals.
         seed: of the draws.
         progress: is told what is looked for, and the share of all work done.
@@ -107,7 +109,8 @@ def measured(
     if not found.detections:
         raise _nothing(photo, asked, found)
     sizes = {name: one for name, one in (("markers", marker_size), ("", size)) if one is not None}
-    document = measure_detections(found, photo, resolved, sizes=sizes, stated=search.targets, level=level, seed=seed)
+    document = measure_detections(found, photo, resolved, sizes=sizes, stated=search.targets, standing=standing,
+                                  level=level, seed=seed)  # fmt: skip
     if not document.measurements and all(note.code != "refused" for note in document.notes):
         seen = ", ".join(dict.fromkeys(one.label for one in found.detections))
         raise NothingFoundError(

@@ -108,6 +108,11 @@ def inputs_from_text(method: Method, texts: Mapping[str, str]) -> Any:
     return _made(method, values)
 
 
+def from_file(text: str) -> Any:
+    """What a person typed for a noun: the text, or with `@` the JSON in the file that it names."""
+    return read_json(Path(text[1:])) if text.startswith("@") else text
+
+
 def _noun_from_text(kind: Any, name: str, text: str, unit: str) -> Any:
     if kind is Quantity:
         return Quantity.parse(text, unit, bare=NAMED.get(unit), name=name)

@@ -159,7 +159,7 @@ def _items(
     places: Sequence[str], footprint: bool, said: GroundTexts,
 ) -> list[Item]:  # fmt: skip
     """What to measure, without how the camera stands."""
-    points = [one for text in feet for one in _single(Observation.parse(text, name="--ground"))]
+    points = [one for text in feet for one in _single(Observation.parse(text, name="--point"))]
     where = [one for text in places for one in _single(Observation.parse(text, name="--sampling"))]
     above = _length(said.point_height, "--point-height")
     height = {} if above is None else {"point_height": above}
@@ -167,7 +167,7 @@ def _items(
         Item(ground_plane.METHOD, {"foot": one, **height}, _named("point", i, points))
         for i, one in enumerate(points, 1)
     ]
-    ends = [Observation.parse(text, name="--ground-length", count=2) for text in lengths]
+    ends = [Observation.parse(text, name="--length", count=2) for text in lengths]
     both = {} if above is None else {"first_height": above, "second_height": dataclasses.replace(above)}
     items += [
         Item(ground_length.METHOD, {"ends": one, **both}, _named("length", i, ends)) for i, one in enumerate(ends, 1)
@@ -186,10 +186,10 @@ def _items(
     ]
     items += [Item(ground_footprint.METHOD, {}, "footprint")] if footprint else []
     if not items:
-        raise InputError("--ground", None, "give a point on the ground, as --ground 640,410")
+        raise InputError("--point", None, "give a point on the ground, as --point 640,410")
     if len(items) > MOST_POINTS:
         allowed = f"give {MOST_POINTS} or fewer at once; propagate.rows of the Python API measures millions"
-        raise InputError("--ground", f"{len(items)} points", allowed)
+        raise InputError("--point", f"{len(items)} points", allowed)
     return items
 
 
@@ -220,7 +220,12 @@ def standing(said: GroundTexts, told: ToldPose | None) -> tuple[str, dict[str, A
     if k is not None and not -10 < float(k.value) < 1:
         raise InputError("--refraction", said.refraction, "give a coefficient below 1, as '0.13 ± 0.1'")
     fields |= {"slope": slope, "cross_slope": cross, "refraction": k}
-    return datum, {name: value for name, value in fields.items() if value is not None}, notes
+    return datum, {name: _known(name, value) for name, value in fields.items() if value is not None}, notes
+
+
+def _known(name: str, value: Any) -> Any:
+    """The noun with an identity that a document keeps, so that what several measurements share stays one there."""
+    return dataclasses.replace(value, id=value.id or f"{name} {value.digest}") if isinstance(value, Quantity) else value
 
 
 def _height(said: GroundTexts, told: ToldPose | None) -> tuple[str, dict[str, Any], tuple[Note, ...]]:

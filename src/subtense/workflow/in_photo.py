@@ -128,9 +128,8 @@ def _with_defaults(method: Method, values: Mapping[str, Any], *, in_photo: bool)
             unit, how = field.metadata["unit"], field.metadata.get("assume")
             assume = getattr(assumptions, how) if how else None
             bare = BARE.get(unit) if how else NAMED.get(unit)
-            found[field.name] = _sensible(
-                Quantity.parse(value, unit, bare=bare, name=field.name, assume=assume), field.name, value
-            )
+            read = Quantity.parse(value, unit, bare=bare, name=field.name, assume=assume)
+            found[field.name] = read if field.metadata.get("signed") else _sensible(read, field.name, value)
         elif isinstance(value, str) and kinds[field.name] is Target:
             found[field.name] = Target.parse(value, name=field.name, assume=assumptions.size)
         elif value is None and in_photo and "in_photo" in field.metadata:
@@ -182,7 +181,7 @@ def _distortion_unknown(inputs: Any) -> tuple[Note, ...]:
         return ()
     half = math.hypot(camera.width_px, camera.height_px) / 2
     middle = np.array([float(camera.cx_px), float(camera.cy_px)])
-    seen = [getattr(inputs, f.name) for f in dataclasses.fields(inputs)]
+    seen = [getattr(inputs, f.name) for f in dataclasses.fields(inputs) if not f.metadata.get("of_photo")]
     points = [one.points_px.reshape(-1, 2) for one in seen if isinstance(one, Observation)]
     farthest = max((float(np.max(np.hypot(*(p - middle).T), initial=0.0)) for p in points), default=0.0) / half
     if farthest <= FAR_OUT or camera.cov is None:

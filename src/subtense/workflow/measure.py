@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,25 +23,31 @@ from ..quantity import Measurement, Note, Quantity
 from ..target import Target
 from ..targets import KnownTarget
 from .detect import Found, detect, item_of
-from .given import inputs_from_json, inputs_from_text, read_json
+from .given import from_file, inputs_from_json, inputs_from_text, read_json
 from .grade import graded_line
 from .in_photo import Item, item_inputs, measure_item
 from .resolve_camera import CAMERA_SOURCES, Resolved, resolve_camera
 from .size_convention import planes_of, size_convention
+from .ways import ground_item, measure_ways, stands
+
+Standing = Callable[[Resolved], Mapping[str, Any]]
+"""How a camera stands above the ground: from what is known of it to fields of `ground.Standing`."""
 
 
 def measure_lines(
     photo: Photo, lines: Sequence[Observation], sizes: Sequence[Quantity], *, camera: str | None = None,
-    tilt: Quantity | None = None, level: float = 0.95, seed: int = 0,
+    tilt: Quantity | None = None, standing: Standing | None = None, level: float = 0.95, seed: int = 0,
 ) -> Document:  # fmt: skip
     """Distance of objects of known size, each from its two ends.
 
     Args:
         photo: the picture.
         lines: two points each, px of the upright picture.
-        sizes: real size of each, m; one for all is enough.
+        sizes: real size of each, m; one for all is enough. None at all where `standing` is told: things are then ranged by
+            where they stand.
         camera: what the user said of it; None to go by the photo.
         tilt: of the objects to the image plane, rad; None takes them as within 20 degrees of facing the camera.
+        standing: how the camera stands above the ground, by which upright things are ranged too.
         level: coverage of the intervals.
         seed: of the draws.
 
@@ -48,19 +55,39 @@ def measure_lines(
         InputError: an end outside the picture, or sizes that don't match.
         UnknownCameraError, GeometryError: no camera, no finite answer.
     """
-    if len(sizes) not in (1, len(lines)):
+    if len(sizes) not in ((1, len(lines)) if standing is None else (0, 1, len(lines))):
         raise InputError("--size", f"{len(sizes)} sizes for {len(lines)} lines", "give one for all, or one for each")
     for line in lines:
         _check_inside(photo, line)
     resolved = resolve_camera(photo, camera)
-    each = list(sizes) * len(lines) if len(sizes) == 1 else list(sizes)
+    each = _sizes_of_lines(sizes, len(lines))
+    ground = None if standing is None else standing(resolved)
     documents = []
     for number, (line, size) in enumerate(zip(lines, each, strict=True), 1):
         label = line.label or (f"line {number}" if len(lines) > 1 else "")
         seen, doubts = graded_line(photo, line)
-        item = Item(known_size.METHOD, {"ends": seen, "size": size, **({"tilt": tilt} if tilt else {})}, label)
-        documents.append(_with_notes(measure_item(item, photo, resolved, level=level, seed=seed), doubts))
+        items = [
+            Item(known_size.METHOD, {"ends": seen, "size": size, **({"tilt": tilt} if tilt else {})}, label)
+            if size is not None
+            else None,
+            None if ground is None else ground_item(seen, ground, label, size),
+        ]
+        ways = [item for item in items if item is not None]
+        if not ways:
+            raise InputError(
+                "--line",
+                label,
+                "it lies across: what stands on the ground is marked from head to foot; else give its --size",
+            )
+        documents.append(_with_notes(measure_ways(ways, photo, resolved, level=level, seed=seed), doubts))
     return joined(documents)
+
+
+def _sizes_of_lines(sizes: Sequence[Quantity], count: int) -> list[Quantity | None]:
+    """One for each line; that for all of them is one and the same doubt."""
+    if len(sizes) == 1 and count > 1:
+        return [dataclasses.replace(sizes[0], id=sizes[0].id or f"size {sizes[0].digest}")] * count
+    return list(sizes) or [None] * count
 
 
 def measure_markers(
@@ -95,7 +122,7 @@ def measure_markers(
 
 def measure_detections(
     found: Found, photo: Photo, camera: Resolved | UnknownCameraError, *, sizes: Mapping[str, Target | Quantity],
-    stated: Sequence[KnownTarget] = (), level: float = 0.95, seed: int = 0,
+    stated: Sequence[KnownTarget] = (), standing: Standing | None = None, level: float = 0.95, seed: int = 0,
 ) -> Document:  # fmt: skip
     """Measure each thing that was found and whose size is known or taken to be known.
 
@@ -105,6 +132,7 @@ def measure_detections(
         camera: of it.
         sizes: by the name of the detector, or "" for any, of things whose size must be told.
         stated: kinds that a person said are in the picture; the size of others is assumed, which is noted.
+        standing: how the camera stands above the ground, by which people and vehicles are ranged too.
         level: coverage of the intervals.
         seed: of the draws.
 
@@ -112,6 +140,7 @@ def measure_detections(
         A document; what has no answer is a note `refused`, and what has no size a note `size_unknown`.
     """
     documents, notes = [], [*found.notes]
+    ground = standing(camera) if standing is not None and isinstance(camera, Resolved) else None
     flat: list[tuple[Detection, object]] = []
     for one, detector in zip(found.detections, found.detectors, strict=True):
         item = item_of(one, sizes.get(detector, sizes.get("")) if one.target is None else None)
@@ -119,8 +148,13 @@ def measure_detections(
             notes += [dataclasses.replace(note, text=f"{one.label}: {note.text}") for note in one.notes]
             notes.append(Note("size_unknown", f"{one.label}: found, and nothing tells its size", "give its size"))
             continue
+        ways = [item]
+        if ground is not None and stands(one, detector):
+            size = item.inputs.get("size")
+            by_foot = ground_item(one.seen, ground, item.label, size if isinstance(size, Quantity) else None)
+            ways += [] if by_foot is None else [by_foot]
         try:
-            document = measure_item(item, photo, camera, level=level, seed=seed)
+            document = measure_ways(ways, photo, camera, level=level, seed=seed)
         except SubtenseError as error:
             if len(found.detections) == 1:
                 raise
@@ -156,28 +190,49 @@ def _with_notes(document: Document, notes: Sequence[Note]) -> Document:
 
 
 def measure_inputs(
-    method: Method, file: Path | None, texts: Mapping[str, str], *, level: float = 0.95, seed: int = 0
-) -> Document:
+    method: Method, file: Path | None, texts: Mapping[str, str], *, photo: Photo | None = None, level: float = 0.95,
+    seed: int = 0,
+) -> Document:  # fmt: skip
     """Any method, by a JSON file of its inputs or by texts for its fields.
+
+    Args:
+        method: of METHODS.
+        file: of its inputs; with a photo, what it leaves out is as in `measure_item`.
+        texts: for its fields, instead; in a photo, `camera` is what is known of it.
+        photo: the picture that its points lie in, which tells the camera too.
+        level: coverage of the intervals.
+        seed: of the draws.
 
     Raises:
         InputError, FileFormatError: inputs that can't be read, or both or neither given.
+        UnknownCameraError: the method needs a camera, and nothing tells it.
         GeometryError: no finite answer.
     """
     if (file is None) == (not texts):
         raise InputError(
             "inputs", "neither" if file is None else "both", "give either --inputs FILE or the single inputs"
         )
-    if file is None:
-        inputs = inputs_from_text(method, texts)
-    else:
+    if file is not None:
         data = read_json(file)
         if not isinstance(data, dict):
             raise FileFormatError(file, "holds no object of inputs")
-        inputs = inputs_from_json(method, data.get("given", data))
+        given = dict(data.get("given", data))
+    if photo is not None:
+        values = {name: from_file(text) for name, text in texts.items()} if file is None else given
+        told = values.pop("camera", None) if isinstance(values.get("camera"), str) else None
+        return measure_item(Item(method, values, judged=True), photo, camera_of(photo, told), level=level, seed=seed)
+    inputs = inputs_from_text(method, texts) if file is None else inputs_from_json(method, given)
     return measure_item(
         Item(method, {k: v for k, v in vars(inputs).items() if v is not None}), None, None, level=level, seed=seed
     )
+
+
+def camera_of(photo: Photo, told: str | None = None) -> Resolved | UnknownCameraError:
+    """The camera of a photo, or why it has none: methods that need none are served without."""
+    try:
+        return resolve_camera(photo, told)
+    except UnknownCameraError as error:
+        return error
 
 
 def no_camera_document(photo: Photo, why: UnknownCameraError) -> Document:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from .. import assumptions
 from ..detection import parse_curve, unknown_curve
@@ -13,14 +14,18 @@ from ..observation import Observation
 from ..photo import Photo
 from ..quantity import Note, Quantity
 from .found import Asked, Progress, measured
-from .measure import joined, measure_lines
+from .ground import GROUND, START, GroundTexts, standing
+from .measure import Standing, joined, measure_lines
+from .resolve_camera import Resolved
 from .snap import snapped_lines, with_line_notes
+from .together import with_distances, with_fused
 
 
 def measure_document(
     photo: Photo, *, lines: Sequence[str] = (), sizes: Sequence[str] = (), tilt: str | None = None,
     marker_size: str | None = None, asked: Asked | None = None, camera: str | None = None, level: float = 0.95,
-    seed: int = 0, snap: bool = False, progress: Progress | None = None,
+    seed: int = 0, snap: bool = False, progress: Progress | None = None, ground: GroundTexts | None = None,
+    between: Sequence[str] = (), same: Sequence[str] = (),
 ) -> Document:  # fmt: skip
     """Lines of known size, or what is found by itself, or both, as one document.
 
@@ -36,6 +41,9 @@ def measure_document(
         seed: of the draws.
         snap: move the ends of lines to the edges and corners near them.
         progress: is told what is looked for, and the share of all work done.
+        ground: how the camera stands above the ground, by which what stands on it is ranged too.
+        between: pairs of things, by number or name, whose distance from each other is wanted: "1,2", or "all".
+        same: things that are one and the same, by number or name: "1,2".
 
     Raises:
         NothingFoundError: nothing found, or nothing to snap to.
@@ -43,7 +51,8 @@ def measure_document(
     """
     told = asked or Asked()
     asked = what_to_look_for(told, marker_size, lines)
-    if lines and not sizes:
+    standing = None if ground is None or ground == GroundTexts() else standing_of(ground)
+    if lines and not sizes and standing is None:
         raise InputError("--size", None, "give the real size of what the line spans, as --size '210 mm'")
     if len(sizes) > 1 and not lines:
         raise InputError("--line", None, "give the two ends of each thing that has a size, as --line 120,80,640,80")
@@ -58,14 +67,34 @@ def measure_document(
         if snap:
             curve = unknown_curve() if told.curve is None else parse_curve(told.curve)
             ends, notes = snapped_lines(photo, ends, curve)
-        document = measure_lines(photo, ends, lengths, camera=camera, tilt=angle, level=level, seed=seed)
+        document = measure_lines(photo, ends, lengths, camera=camera, tilt=angle, standing=standing, level=level,
+                                 seed=seed)  # fmt: skip
         found.append(with_line_notes(document, notes))
     if asked is not None:
         side = None if marker_size is None else read_length(marker_size, "--marker-size")
         size = read_length(sizes[0], "--size") if sizes and not lines else None
-        found.append(measured(photo, asked, size=size, marker_size=side, camera=camera, level=level, seed=seed,
-                              progress=progress))  # fmt: skip
-    return joined(found)
+        found.append(measured(photo, asked, size=size, marker_size=side, camera=camera, standing=standing, level=level,
+                              seed=seed, progress=progress))  # fmt: skip
+    document = joined(found)
+    for text in same:
+        document = with_fused(document, text, level=level, seed=seed)
+    for text in between:
+        document = with_distances(document, text, level=level, seed=seed)
+    return document
+
+
+def standing_of(ground: GroundTexts) -> Standing:
+    """How a camera stands, by what was typed and what its photo tells."""
+
+    def told(camera: Resolved) -> Mapping[str, Any]:
+        datum, fields, _ = standing(ground, camera.pose)
+        if datum not in (GROUND, START):
+            raise InputError(
+                "--height", ground.height, "give it above the ground; a terrain model serves `subtense ground` only"
+            )
+        return fields
+
+    return told
 
 
 def what_to_look_for(asked: Asked, marker_size: str | None, lines: Sequence[str]) -> Asked | None:
