@@ -2,7 +2,7 @@ import { describe, expect, it, vi } from "vitest";
 import { Latest, type Detection, type MethodRow } from "../src/lib/api";
 import { Undo } from "../src/lib/undo";
 import { Calculator, fromFragment, toFragment } from "../src/calculator/state.svelte";
-import { constrained, inputsOf, inside, moved, nextLabel, notesOf, pointFields, readProject, readSheet, sameFound, shapeOf, snappedTo, turned, typedFields, unsnapped, wanting, type Shape } from "../src/measure/session";
+import { constrained, inputsOf, inside, isTool, moved, nextLabel, notesOf, pointFields, readProject, readSheet, sameFound, shapeOf, snappedTo, turned, typedFields, unsnapped, wanting, type Shape } from "../src/measure/session";
 import { toPicture, toScreen } from "../src/measure/viewer";
 
 vi.mock("openseadragon", () => ({ default: { console: {} } }));
@@ -28,7 +28,7 @@ const method = {
 
 describe("a method's row", () => {
   it("tells which fields take points and which are typed", () => {
-    expect(pointFields(method)).toEqual([{ name: "ends", count: 2, least: 2, closed: false }]);
+    expect(pointFields(method)).toEqual([{ name: "ends", count: 2, least: 2, closed: false, round: false }]);
     expect(typedFields(method).map((field) => field.name)).toEqual(["size"]);
     expect(wanting(shape, method)).toEqual([]);
     expect(wanting({ ...shape, texts: { size: " " } }, method)).toEqual(["size"]);
@@ -38,7 +38,15 @@ describe("a method's row", () => {
   it("may take any number of points, and ask for some that can be left out", () => {
     const rim = { description: "", "x-noun": "Observation", "x-widget": "points", "x-closed": true } as const;
     const disc = { ...method, inputs: { required: ["rim"], properties: { rim, horizon: rim } } };
-    expect(pointFields(disc)).toEqual([{ name: "rim", count: Infinity, least: 5, closed: true }]);
+    expect(pointFields(disc)).toEqual([{ name: "rim", count: Infinity, least: 5, closed: true, round: true }]);
+    const ball = { ...disc, inputs: { ...disc.inputs, properties: { rim: { ...rim, "x-least": 3 } } } };
+    expect(pointFields(ball)[0]).toMatchObject({ count: Infinity, least: 3 });
+  });
+  it("takes more points than it must in its last field alone", () => {
+    const [four, three] = [4, 3].map((n) => ({ description: "", "x-noun": "Observation", "x-widget": "points", "x-points": n, "x-more": true, "x-closed": true }) as const);
+    const area = { ...method, inputs: { required: ["points", "path"], properties: { points: four!, path: three! } } };
+    expect(pointFields(area).map(({ count, least, round }) => [count, least, round])).toEqual([[4, 4, false], [Infinity, 3, false]]);
+    expect(isTool(area)).toBe(true);
   });
 });
 

@@ -69,6 +69,7 @@ export interface FieldSchema {
   "x-unit"?: string;
   "x-points"?: number;
   "x-least"?: number;
+  "x-more"?: boolean;
   "x-closed"?: boolean;
   "x-typed"?: boolean;
 }

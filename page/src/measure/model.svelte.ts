@@ -2,7 +2,7 @@
 import { ApiError, get, Latest, post, send, type CameraSaid, type Detection, type Doc, type GivenCamera, type MethodRow, type Note, type Outlined, type Photo, type Seen, type Tables, type Target } from "../lib/api";
 import { store } from "../lib/store";
 import { Undo } from "../lib/undo";
-import { EMPTY, inputsOf, nextLabel, notesOf, outlineShape, PROJECT, readProject, readSheet, sameFound, shapeOf, sigmaOf, snappedTo, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
+import { EMPTY, inputsOf, nextLabel, notesOf, outlineShape, pointFields, PROJECT, readProject, readSheet, sameFound, shapeOf, sigmaOf, snappedTo, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
 
 export type Answer = { state: "done"; doc: Doc } | { state: "wants"; fields: string[] } | { state: "refused"; message: string; field: string | null } | { state: "waits" };
 
@@ -236,7 +236,9 @@ export class Model {
     this.said = "";
     let now = shape;
     for (const [field, points] of Object.entries(shape.points)) {
-      if (shape.seen?.[field] || (points.length !== 2 && points.length !== 4)) continue;
+      const row = this.method(shape.method);
+      const round = row && pointFields(row).some((one) => one.name === field && one.round); // a rim has no corners
+      if (shape.seen?.[field] || round || (points.length !== 2 && points.length !== 4)) continue;
       try {
         const body = { photo: sheet.photo.id, points_px: points, ...(typeof sigma === "number" ? { sigma_px: sigma } : {}) };
         const { observation, notes } = await this.withPhoto(sheet.photo.id, () => post<{ observation: Seen; notes: Note[] }>("/api/snap", body));

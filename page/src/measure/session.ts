@@ -73,15 +73,18 @@ export interface PointField {
   count: number;
   least: number;
   closed: boolean;
+  /** Whether its points lie on a rim, so that the line through them is round; else they are corners. */
+  round: boolean;
 }
 
-/** Fields of a method that take points and can not do without, in order. */
+/** Fields of a method that take points and can not do without, in order. Only the last may be free: it is clear where it begins. */
 export function pointFields(method: MethodRow): PointField[] {
   return Object.entries(method.inputs.properties)
     .filter(([name, field]) => field["x-noun"] === "Observation" && method.inputs.required.includes(name))
-    .map(([name, field]) => {
-      const count = field["x-points"] ?? Infinity;
-      return { name, count, least: field["x-points"] ?? field["x-least"] ?? LEAST_OF_MANY, closed: field["x-closed"] ?? false };
+    .map(([name, field], i, all) => {
+      const [points, closed] = [field["x-points"], field["x-closed"] ?? false];
+      const count = points === undefined || (field["x-more"] && i === all.length - 1) ? Infinity : points;
+      return { name, count, least: points ?? field["x-least"] ?? LEAST_OF_MANY, closed, round: closed && points === undefined };
     });
 }
 
@@ -103,7 +106,7 @@ export function isTool(method: MethodRow): boolean {
   const fields = pointFields(method);
   // two cameras are no single photo's
   const rig = Object.values(method.inputs.properties).some((field) => field["x-noun"] === "Rig");
-  return !rig && fields.length > 0 && fields.every((field) => field.count < Infinity || field.closed);
+  return !rig && fields.length > 0 && fields.every((field) => field.closed || method.inputs.properties[field.name]!["x-points"] !== undefined);
 }
 
 /** The stated standard deviation of an end, px; undefined where nothing was said, null where it can't be read. */

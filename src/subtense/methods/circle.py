@@ -52,7 +52,7 @@ class Inputs:
     """
 
     camera: Camera
-    rim: Observation = field(metadata={"closed": True})
+    rim: Observation = field(metadata={"closed": True, "least": LEAST_POINTS})
     diameter: Quantity = field(metadata={"unit": "m", "assume": "size"})
     focus: Quantity = field(default_factory=thin_lens, metadata={"unit": "1"})
     side: Quantity = field(default_factory=either_side, metadata={"unit": "1"})

@@ -10,8 +10,8 @@ from ..camera import Camera
 from ..method import Method
 from ..noun import Noun
 from ..observation import Observation
-from ..rig import Rig
 from ..quantity import Quantity
+from ..rig import Rig
 from ..target import Target
 from ..views import Track, Views
 from .given import given, noun_types
@@ -109,9 +109,9 @@ def _property(inputs: type, field: Any, kind: type) -> dict[str, Any]:
         "description": text, "x-noun": kind.__name__, "x-widget": kind.widget,
         "anyOf": [{"type": "string", "description": _ALSO_TYPED}, {"type": "object", **NOUNS[kind]}, _SAME],
     }  # fmt: skip
-    for key, name in (("unit", "x-unit"), ("points", "x-points"), ("closed", "x-closed")):
+    for key in ("unit", "points", "least", "more", "closed"):
         if key in field.metadata:
-            found[name] = field.metadata[key]
+            found[f"x-{key}"] = field.metadata[key]
     found["x-typed"] = "assume" in field.metadata or (kind is not Quantity)
     return found
 
