@@ -34,6 +34,7 @@ class Reason(enum.IntEnum):
     NO_PARALLAX = 15
     NO_BASELINE = 16
     PARALLEL_RAYS = 17
+    UNDETERMINED = 18
 
     @property
     def text(self) -> str:
@@ -82,6 +83,10 @@ _REASONS: dict[Reason, tuple[str, bool]] = {
     ),
     Reason.UPSIDE_DOWN: (
         "base and top are exchanged: the first point is the base on the plane, the second the top",
+        False,
+    ),
+    Reason.UNDETERMINED: (
+        "the conditions do not fix the plane: more than one meets them; give one more, of another kind or direction",
         False,
     ),
     Reason.NO_BASELINE: ("the first two pictures of the point were taken from one place, which tells no distance", False),
