@@ -24,8 +24,11 @@ from subtense.workflow.tables import METHODS
 SCENES = 4000
 
 
-def planned(solve=(), **said):
-    [found] = plan(PlanTexts(**said), solve=solve)
+def planned(solve=(), between=None, **said):
+    """The plan of one way, by default without a table, which takes its time."""
+    distance = said["distance"]
+    number, unit = distance.split()
+    [found] = plan(PlanTexts(**said), solve=solve, between=between or f"{distance} to {1.01 * float(number)} {unit}")
     return found
 
 
@@ -224,7 +227,7 @@ OPTION = {
 @pytest.mark.parametrize("key", OPTION)
 def test_what_is_solved_for_reaches_it_and_a_little_less_does_not(key):
     said = {"distance": "10 m", "accuracy": "10 cm", "way": "known_size", "focal": "2900 px ± 0.2 %", "size": "1 m ± 0.1 %",
-            "tilt": "0 ± 2 deg", "pixel_error": "1 px"}  # fmt: skip
+            "tilt": "0 ± 2 deg" if key == "tilt-error" else "0 exact", "pixel_error": "1 px"}  # fmt: skip
     one = solution(planned(solve=[key], **said), key)
     assert one.reached
     edge, beyond = (one.low, 0.97) if one.low is not None and key not in ("distance",) else (one.high, 1.03)
@@ -243,7 +246,7 @@ def test_where_the_size_itself_is_the_limit_no_lens_helps():
     assert solution(found, "size").reached  # a larger thing known to the same 3 cm
     text = run("--distance", "20 m", "--accuracy", "5 cm", "--way", "known_size", "--size", "1.75 ± 0.03 m", "--tilt", "0 exact",
                "--focal", "3000 px exact").output  # fmt: skip
-    assert re.search(r"focal length +none: at best ±0\.3\d m.*; size alone\s+makes ±0\.34 m", text)
+    assert re.search(r"focal length +none: at best ±0\.3\d m, near .*; ±0\.34 m by size alone", text)
 
 
 def test_a_doubt_said_in_per_cent_goes_with_its_value_and_one_in_metres_stays():
@@ -280,6 +283,47 @@ def test_shared_out_doubts_reach_it():
     assert max(lines) < 0.4
 
 
+def test_a_longer_baseline_with_a_better_calibration_reaches_what_neither_does():
+    said = {
+        "distance": "20 m",
+        "accuracy": "5 cm",
+        "way": "stereo",
+        "focal": "3000 px ± 0.4 %",
+        "baseline": "12 cm ± 0.4 %",
+    }
+    found = planned(**said)
+    assert not any(one.reached for one in found.solutions if one.key != "distance")
+    together, u = found.combined.solution, {one.key: one.u / one.value for one in found.combined.shares}
+    assert set(u) == {"focal", "baseline"}
+    better = {
+        "focal": f"3000 px ± {100 * HALF_WIDTH_95 * u['focal']} %",
+        "baseline": f"{together.low} m ± {100 * HALF_WIDTH_95 * u['baseline']} %",
+    }  # fmt: skip
+    assert planned(**{**said, **better}).reached
+    assert not planned(**{**said, **better, "baseline": f"{0.9 * together.low} m ± 0.1 %"}).reached
+
+
+def test_where_one_change_is_enough_no_other_is_asked_for():
+    found = planned(distance="20 m", accuracy="40 cm", way="stereo", baseline="20 cm ± 0.1 %")
+    assert not found.reached
+    assert solution(found, "baseline").reached
+    assert found.combined is None
+
+
+def test_a_disparity_that_is_not_resolved_is_told_with_what_resolves_it():
+    said = {"distance": "2000 m", "accuracy": "100 m", "way": "stereo"}
+    found = planned(baseline="20 cm ± 0.1 %", **said, solve=["baseline"])
+    assert found.answer.measured is None
+    assert "3 are needed" in found.answer.reason
+    assert found.reached is False
+    baseline_m = solution(found, "baseline").low
+    assert planned(baseline=f"{baseline_m} m ± 0.1 %", **said, solve=["baseline"]).reached
+    assert (
+        "no answer"
+        in run(*(f"--{key}={text}" for key, text in said.items()), "--baseline=20 cm ± 0.1 %").output.splitlines()[0]
+    )
+
+
 def test_accuracies_are_read_as_the_house_reads_a_doubt():
     assert wanted_of("5 cm", 20.0).half_width_m == pytest.approx(0.05)
     assert wanted_of("± 5 cm", 20.0).half_width_m == pytest.approx(0.05)
@@ -312,7 +356,7 @@ def test_the_cure_is_that_of_reports():
 
 
 def test_rows_without_an_answer_have_a_reason():
-    found = planned(distance="10 m", way="known_size", size="1 m ± 1 %")
+    found = planned(distance="10 m", way="known_size", size="1 m ± 1 %", between="1 m to 100 m")
     small = [row for row in plan(PlanTexts("10 m", way="known_size"), between="10 cm to 1 m")[0].rows if row.reason]
     assert small
     assert all("does not fit" in row.reason and row.half_width_m is None for row in small)
@@ -385,10 +429,10 @@ def test_impossible_input_is_one_line(words, says):
 
 def test_the_text_says_it_all():
     text = run("--distance", "20 m", "--accuracy", "50 cm", "--way", "stereo", "--baseline", "20 cm ± 0.1 %").output
-    assert text.startswith("two cameras side by side: distance 20 m   95 %: ±0.")
+    assert text.startswith("two cameras side by side: depth 20 m   95 %: ±0.")
     assert "not reached" in text.splitlines()[0]
-    assert re.search(r"\n  baseline +20\d mm to \d+\.\d m; at 20 m nothing is in both pictures", text)
-    assert re.search(r"\n  20 m +0\.\d\d m +±0\.\d\d m +\d\.\d % +disparity \d\d %\n", text)
+    assert re.search(r"\n  baseline +20\d mm \(29\.\d px in the picture\) to \d+\.\d m; at 20 m nothing", text)
+    assert re.search(r"\n  20 m +\d\d(\.\d)? px +0\.\d\d m +±0\.\d\d m +\d\.\d % +disparity \d\d %\n", text)
     assert max(map(len, text.splitlines())) <= 130
 
 

@@ -88,11 +88,13 @@ class Row:
         distance_m: of the thing that is measured, or its length where that is what is measured.
         measured: what the method gives there; None where it has no answer.
         reason: why it has none; empty where it has.
+        seen_px: how long it is in the picture, or its disparity; None where that has no meaning.
     """
 
     distance_m: float
     measured: Measurement | None
     reason: str = ""
+    seen_px: float | None = None
 
     @property
     def half_width_m(self) -> float | None:
@@ -113,7 +115,7 @@ class Row:
         return {
             "distance_m": self.distance_m, "u_m": m.u if m else None, "low_m": m.low if m else None,
             "high_m": m.high if m else None, "half_width_m": self.half_width_m, "evaluation": m.evaluation if m else None,
-            "largest": top.to_json() if top else None, "reason": self.reason,
+            "largest": top.to_json() if top else None, "reason": self.reason, "seen_px": self.seen_px,
         }  # fmt: skip
 
 
@@ -136,6 +138,7 @@ class Solution:
         limit: where none does, what stands in the way.
         limit_half_width_m: what that alone makes, as the half-width of a 95 % interval.
         cure: what lessens that.
+        seen_px: how long the thing is in the picture there, or its disparity; None where that has no meaning.
         beyond: why values beyond `high` (or `low`, or the best) have no answer, where they have none.
     """
 
@@ -153,6 +156,7 @@ class Solution:
     limit: str = ""
     limit_half_width_m: float | None = None
     cure: str = ""
+    seen_px: float | None = None
     beyond: str = ""
 
     def to_json(self) -> dict[str, Any]:
@@ -161,7 +165,7 @@ class Solution:
             "key": self.key, "title": self.title, "unit": self.unit, "reached": self.reached, "low": self.low, "high": self.high,
             "tried": list(self.tried), "best": self.best, "half_width_m": self.half_width_m, "law": self.law, "of": self.of,
             "limit": self.limit, "limit_half_width_m": self.limit_half_width_m, "cure": self.cure,
-            "beyond": self.beyond,
+            "seen_px": self.seen_px, "beyond": self.beyond,
         }  # fmt: skip
 
 
@@ -170,6 +174,7 @@ class Share:
     """How well one number must be known where the error that is allowed is shared out among all.
 
     Attributes:
+        key: of the entry.
         title: of the entry.
         now_u: as it is known now, in `unit`.
         u: as it must be known; the same as `now_u` where that is well enough.
@@ -178,6 +183,7 @@ class Share:
         law: of the doubt.
     """
 
+    key: str
     title: str
     now_u: float
     u: float
@@ -188,6 +194,7 @@ class Share:
     def to_json(self) -> dict[str, Any]:
         """As in the published schema."""
         return {
+            "key": self.key,
             "title": self.title,
             "value": self.value,
             "now_u": self.now_u,
@@ -195,6 +202,23 @@ class Share:
             "unit": self.unit,
             "law": self.law,
         }
+
+
+@dataclass(frozen=True)
+class Combined:
+    """What reaches the accuracy where no single change does.
+
+    Attributes:
+        solution: the values of the way's main number that do.
+        shares: how well others must be known beside it.
+    """
+
+    solution: Solution
+    shares: tuple[Share, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """As in the published schema."""
+        return {"solution": self.solution.to_json(), "shares": [one.to_json() for one in self.shares]}
 
 
 @dataclass(frozen=True)
@@ -212,6 +236,7 @@ class Plan:
         rows: what it gives at others.
         solutions: what reaches the accuracy, one number changed at a time.
         shares: what reaches it by knowing all numbers better.
+        combined: what reaches it by a change and by knowing others better; None where one change is enough, or nothing is.
         curve: rows close together, for a chart.
         sampling: ground per pixel, of a picture from above; None for others.
         notes: doubts.
@@ -228,6 +253,7 @@ class Plan:
     rows: tuple[Row, ...] = ()
     solutions: tuple[Solution, ...] = ()
     shares: tuple[Share, ...] = ()
+    combined: Combined | None = None
     curve: tuple[Row, ...] = ()
     sampling: Measurement | None = None
     notes: tuple[Note, ...] = ()
@@ -254,5 +280,6 @@ class Plan:
             "given": [entry.to_json() for entry in self.entries], "answer": self.answer.to_json(),
             "budget": [line.to_json() for line in budget], "improve": self.improve, "sampling": scale,
             "rows": [row.to_json() for row in self.rows], "solutions": [one.to_json() for one in self.solutions],
-            "shares": [one.to_json() for one in self.shares], "notes": [note.to_json() for note in self.notes],
+            "shares": [one.to_json() for one in self.shares],
+            "combined": self.combined.to_json() if self.combined else None, "notes": [note.to_json() for note in self.notes],
         }  # fmt: skip

@@ -41,10 +41,12 @@ def _summary(plans: Sequence[Plan]) -> str:
 
 def _lines(plan: Plan, *, whole: bool = True) -> Iterator[str]:
     yield headline(plan)
+    if plan.answer.measured is None:
+        yield from wrap(plan.answer.reason, WIDTH, initial_indent="  ", subsequent_indent="  ")
+    yield from _scale(plan)
+    yield "with"
+    yield columns([(f"  {e.title}", given(e), e.quantity.source) for e in plan.entries])
     if plan.answer.measured is not None:
-        yield from _scale(plan)
-        yield "with"
-        yield columns([(f"  {e.title}", given(e), e.quantity.source) for e in plan.entries])
         if whole:
             yield "what the error consists of"
             yield from _budget(plan)
@@ -68,6 +70,11 @@ def _reaching(plan: Plan, wanted: Wanted) -> Iterator[str]:
     if plan.solutions:
         yield f"{what}, one thing changed at a time"
         yield from _solutions(plan)
+    if plan.combined:
+        one = plan.combined.solution
+        yield f"{what} by a change and by knowing others better"
+        yield from wrap(f"  {one.title}  {reaches(one)}", WIDTH, subsequent_indent="    ")
+        yield columns([_share(share) for share in plan.combined.shares])
     if plan.shares:
         yield f"{what} by knowing all of it better, in equal shares"
         yield columns([_share(one) for one in plan.shares])
@@ -184,20 +191,19 @@ def _value(one: Solution, x: float, digits: int = 3) -> str:
 
 def reaches(one: Solution) -> str:
     """Which values reach what is wanted, or what stands in the way, in words."""
-    if one.reached and one.low is not None and one.high is not None:
-        text = f"{_value(one, one.low)} to {_value(one, one.high)}"
-    elif one.reached and one.low is not None:
-        text = f"at least {_value(one, one.low)}"
-    elif one.reached and one.high is not None:
-        text = f"at most {_value(one, one.high)}"
-    elif one.reached:
-        text = (
-            f"any up to {_value(one, one.tried[1])}"
-            if one.law
-            else f"any from {_value(one, one.tried[0])} to {_value(one, one.tried[1])}"
-        )
-    else:
+    if not one.reached:
         return _out_of_reach(one)
+    # the thing's length in the picture belongs to the lower value where there is one, else to the higher
+    seen = "" if one.seen_px is None or one.law else f" ({_digits(one.seen_px, 3)} px in the picture)"
+    if one.low is not None and one.high is not None:
+        text = f"{_value(one, one.low)}{seen} to {_value(one, one.high)}"
+    elif one.low is not None:
+        text = f"at least {_value(one, one.low)}{seen}"
+    elif one.high is not None:
+        text = f"at most {_value(one, one.high)}{seen}"
+    else:
+        least = "up" if one.law else f"from {_value(one, one.tried[0])}"
+        text = f"any {least} to {_value(one, one.tried[1])}"
     return f"{text}; {one.beyond}" if one.beyond and one.high is not None else text
 
 
@@ -212,7 +218,7 @@ def _out_of_reach(one: Solution) -> str:
         else f"none: at best {best}, near {_value(one, one.best)}"
     )
     if one.limit_half_width_m is not None:
-        text += f"; {one.limit} alone makes ±{length(one.limit_half_width_m)}"
+        text += f"; ±{length(one.limit_half_width_m)} by {one.limit} alone"
     return f"{text}; {one.beyond}" if one.beyond else text
 
 
@@ -227,22 +233,31 @@ def _share(one: Share) -> tuple[str, str, str]:
 
 
 def _table(plan: Plan) -> str:
-    rows = [(plan.what, "u", "± (95 %)", "", "largest part")]
-    rows += [_row(row, plan) for row in plan.rows]
-    return columns([(f"  {first}", *rest) for first, *rest in rows])
+    seen = any(row.seen_px is not None for row in plan.rows)
+    head = (f"  {plan.what}", "in the picture", "u", "± (95 %)", "", "largest part")
+    rows = [head, *(_row(row, plan) for row in plan.rows)]
+    return columns(rows if seen else [(row[0], *row[2:]) for row in rows])
 
 
-def _row(row: Row, plan: Plan) -> tuple[str, str, str, str, str]:
-    at = _short(row.distance_m, "m", 4)
+def _row(row: Row, plan: Plan) -> tuple[str, ...]:
+    at = f"  {_short(row.distance_m, 'm', 4)}"
     if row.measured is None:
-        return at, "-", "-", "", row.reason
+        return at, "-", "-", "-", "", row.reason.split(";")[0]
     half, top = row.half_width_m, row.largest
     u = "-" if row.measured.u is None else _two(row.measured.u)
+    seen = "-" if row.seen_px is None else f"{_digits(row.seen_px, 3)} px"
     largest = f"{top.name} {100 * top.share:.0f} %" if top else ""
     if half is None:
-        return at, u, "open", "", largest
+        return at, seen, u, "open", "", largest
     enough = plan.wanted is not None and half <= plan.wanted.at(row.distance_m)
-    return at, u, f"±{_two(half)}", percent(half / row.distance_m), f"{largest}{'   reaches it' if enough else ''}"
+    return (
+        at,
+        seen,
+        u,
+        f"±{_two(half)}",
+        percent(half / row.distance_m),
+        f"{largest}{'   reaches it' if enough else ''}",
+    )
 
 
 def _two(value_m: float) -> str:

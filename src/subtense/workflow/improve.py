@@ -9,6 +9,10 @@ from ..quantity import Measurement
 from ..reports.rounding import digits_for, fitting_unit, grouped
 
 CURES = (
+    ("map value", "anchor the map near the place, choose a place within the thing, or use a better map"),
+    ("map scale", "give more anchors, or better known ones"),
+    ("map shift", "give anchors nearer and farther away"),
+    ("log factor", "give one known distance in the picture, with --anchor"),
     ("pitch", "mark the horizon, or measure the pitch with a spirit level at the camera"),
     ("roll", "mark the horizon, or level the camera"),
     ("slope", "measure the slope of the ground and state its ±"),
@@ -17,8 +21,9 @@ CURES = (
     ("shape of the survey", "survey the points more closely"),
     ("focal length", "calibrate the camera at this focus (20 pictures of a board), or measure one known distance"),
     ("pixel aspect", "calibrate the camera"),
+    ("rotation between the cameras", "calibrate the pair, and keep it rigid"),
     ("baseline", "calibrate the pair at this focus, and keep it rigid"),
-    ("principal point difference", "calibrate the pair at this focus"),
+    ("principal points", "calibrate the pair at this focus"),
     (
         "disparity",
         "set the cameras farther apart, use a longer lens or more pixels, or match to a smaller part of a pixel",

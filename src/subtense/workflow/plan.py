@@ -19,7 +19,8 @@ from ..planned import Plan, Wanted
 from ..quantity import Measurement, Note
 from .improve import improve
 from .plan_input import PlanTexts, distance_of, length_with_unit, setup_of, wanted_of, ways_of
-from .plan_solve import knobs, row_at, shares, solutions
+from .plan_solve import knobs, row_at, solutions
+from .plan_together import combined, shares
 from .plan_ways import Setup, Way
 
 STEPS = (1.0, 2.0, 5.0)
@@ -57,9 +58,9 @@ def plan(
         raise InputError("--solve", ", ".join(solve), "say what is to be reached, as --accuracy '5 cm'")
     ends = _ends(between, distance_m)
     setups = [(way, setup_of(way, said, distance_m)) for way in ways]
+    if len(setups) == 1:
+        setups[0][0].inputs(setups[0][1], distance_m)  # the reason why nothing is seen there is the error
     plans = [_plan(way, setup, distance_m, wanted, solve, ends, curve=curve) for way, setup in setups]
-    if len(plans) == 1 and plans[0].answer.measured is None:
-        raise GeometryError(plans[0].answer.reason, code="no_answer")
     return tuple(plans)
 
 
@@ -69,10 +70,14 @@ def _plan(
 ) -> Plan:  # fmt: skip
     answer = row_at(way, setup, distance_m, draws=None)
     made = Plan(way.name, way.title, way.what, way.method.name, wanted, tuple(setup.entries.values()), answer)
-    if answer.measured is None:
-        return dataclasses.replace(made, notes=(Note("refused", answer.reason),))
+    try:
+        way.inputs(setup, distance_m)
+    except GeometryError as error:
+        return dataclasses.replace(made, notes=(Note("refused", str(error)),))
     rows = tuple(row_at(way, setup, x) if x != distance_m else answer for x in _steps(*ends, distance_m))
-    made = dataclasses.replace(made, rows=rows, improve=improve(answer.measured), sampling=_sampling(way, setup))
+    made = dataclasses.replace(
+        made, rows=rows, improve=improve(answer.measured) if answer.measured else "", sampling=_sampling(way, setup)
+    )
     if curve:
         close = np.geomspace(*ends, CURVE_POINTS).tolist()
         made = dataclasses.replace(made, curve=tuple(row_at(way, setup, x) for x in close))
@@ -80,7 +85,10 @@ def _plan(
         found = solutions(knobs(way, setup, distance_m, wanted), solve)
         made = dataclasses.replace(made, solutions=found)
         if not made.reached and not solve:
-            made = dataclasses.replace(made, shares=shares(way, setup, distance_m, wanted.half_width_m))
+            together = combined(way, setup, distance_m, wanted, found)
+            made = dataclasses.replace(
+                made, shares=shares(way, setup, distance_m, wanted.half_width_m), combined=together
+            )
     return dataclasses.replace(made, notes=_notes(made))
 
 

@@ -1,4 +1,4 @@
-"""Which values of one number of a set-up reach an accuracy, all others held; and how well all must be known together.
+"""Which values of one number of a set-up reach an accuracy, all others held.
 
 Each value is tried by the method itself. Where the error crosses what is wanted is found by bracketing on logarithms, so
 nothing here knows how an error grows.
@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from .. import propagate
 from ..distribution import HALF_WIDTH_95
 from ..errors import GeometryError, InputError
-from ..planned import Entry, Row, Share, Solution, Wanted
+from ..planned import Entry, Row, Solution, Wanted
 from .improve import cure_of
 from .plan_ways import Setup, Way
 
@@ -34,7 +33,6 @@ ERROR_RANGE = 1e-4, 100.0
 """Doubts that are tried, in those of the set-up."""
 LARGEST_ANGLE_RAD = 0.35
 """u of an angle beyond which nothing is tried."""
-LEAST_SHARE = 1e-6
 
 
 def row_at(way: Way, setup: Setup, distance_m: float, *, draws: int | None = DRAWS) -> Row:
@@ -54,7 +52,7 @@ def row_at(way: Way, setup: Setup, distance_m: float, *, draws: int | None = DRA
             [found] = propagate.measure(way.headline, inputs, draws=draws)
     except GeometryError as error:
         return Row(distance_m, None, str(error))
-    return Row(distance_m, found)
+    return Row(distance_m, found, seen_px=way.seen_px(inputs) if way.seen_px else None)
 
 
 # -- one number at a time -----------------------------------------------------------------------------------------------
@@ -192,8 +190,9 @@ def _solution(knob: Knob) -> Solution:
         else ""
     )
     return dataclasses.replace(
-        made, low=low, high=high, reached=True, half_width_m=tried.row(at).half_width_m, beyond=beside
-    )
+        made, low=low, high=high, reached=True, half_width_m=tried.row(at).half_width_m,
+        seen_px=tried.row(at).seen_px, beyond=beside,
+    )  # fmt: skip
 
 
 def _best(grid: Sequence[float], ratios: Sequence[float], now: float) -> float:
@@ -276,99 +275,3 @@ def _with_limit(made: Solution, tried: _Tried, grid: Sequence[float]) -> Solutio
     reason = next((row.reason for row in beside if row.reason), "")
     return dataclasses.replace(made, limit=top.name, limit_half_width_m=HALF_WIDTH_95 * abs(top.u),
                                cure=cure_of(top.name), beyond=reason)  # fmt: skip
-
-
-# -- all of them together -----------------------------------------------------------------------------------------------
-
-
-def shares(way: Way, setup: Setup, distance_m: float, wanted_m: float) -> tuple[Share, ...]:
-    """How well each number must be known where the error that is allowed is shared out equally among those that make it.
-
-    What is known well enough for less than its share stays as it is, and leaves more to the others. Empty where what is no
-    number of the set-up (the lens's distortion, a focus) makes more than is wanted.
-    """
-    doubtful = [e for e in setup.entries.values() if e.error_key and float(e.quantity.u) > 0]
-    certain = setup
-    for entry in doubtful:
-        certain = certain.with_entry(entry.known_to(0.0))
-
-    def alone(entry: Entry, u: float) -> float:
-        half = row_at(way, certain.with_entry(entry.known_to(u)), distance_m).half_width_m
-        return math.inf if half is None else half
-
-    rest = alone(doubtful[0], 0.0) if doubtful else math.inf
-    if not rest < wanted_m:
-        return ()
-    share_m = _equal_share(
-        wanted_m**2 - rest**2, [math.sqrt(max(alone(e, float(e.quantity.u)) ** 2 - rest**2, 0.0)) for e in doubtful]
-    )
-    limit_m = math.hypot(share_m, rest)
-    allowed = {e.key: _allowed(partial(alone, e), float(e.quantity.u), limit_m) for e in doubtful}
-    allowed = _together(way, setup, distance_m, wanted_m, doubtful, allowed)
-    return tuple(
-        Share(
-            e.title,
-            float(e.quantity.u),
-            allowed[e.key],
-            float(e.quantity.value),
-            e.quantity.unit,
-            e.quantity.distribution.name,
-        )
-        for e in doubtful
-    )
-
-
-def _equal_share(total: float, alone: Sequence[float]) -> float:
-    """The error that each may make, as a half-width, where what makes less leaves its rest to the others."""
-    left, count = total, len(alone)
-    for half in sorted(alone):
-        if half**2 >= left / count:
-            break
-        left, count = left - half**2, count - 1
-    return math.sqrt(left / count) if count else math.inf
-
-
-def _allowed(half_width: Callable[[float], float], now: float, share_m: float) -> float:
-    """The doubt, at most the present one, that makes no more than its share."""
-    if half_width(now) <= share_m:
-        return now
-    low, high = math.log(now * LEAST_SHARE), math.log(now)
-    while high - low > 1e-3:
-        middle = (low + high) / 2
-        if half_width(math.exp(middle)) <= share_m:
-            low = middle
-        else:
-            high = middle
-    return math.exp(low)
-
-
-def _together(
-    way: Way, setup: Setup, distance_m: float, wanted_m: float, doubtful: Sequence[Entry], allowed: dict[str, float]
-) -> dict[str, float]:
-    """The doubts, the lessened ones lessened further until all together reach what is wanted; rounded to the safe side."""
-
-    def lessened(factor: float) -> dict[str, float]:
-        return {
-            e.key: allowed[e.key] if allowed[e.key] == float(e.quantity.u) else _floor2(factor * allowed[e.key])
-            for e in doubtful
-        }
-
-    for factor in _factors():
-        found = lessened(factor)
-        tried = setup
-        for entry in doubtful:
-            tried = tried.with_entry(entry.known_to(found[entry.key]))
-        half = row_at(way, tried, distance_m).half_width_m
-        if half is not None and half <= wanted_m:
-            break
-    return found
-
-
-def _factors() -> Iterator[float]:
-    yield from (1.0 - step / 50 for step in range(40))
-
-
-def _floor2(u: float) -> float:
-    """Down to two significant digits."""
-    unit = 10.0 ** (math.floor(math.log10(u)) - 1)
-    return math.floor(u / unit * (1 + 1e-9)) * unit

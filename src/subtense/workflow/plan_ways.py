@@ -15,16 +15,16 @@ from typing import Any
 import numpy as np
 
 from .. import ground
-from ..arrays import Array, Codes
+from ..arrays import Array
 from ..camera import Camera
 from ..errors import GeometryError
 from ..horizon import effective_radius_m, level_from_angles
 from ..hypothesis import unknown_lens
-from ..method import Method, Output, Reason, reasons
-from ..methods import ground_length, ground_plane, ground_sampling, known_size
+from ..method import Method
+from ..methods import ground_length, ground_plane, ground_sampling, known_size, stereo
 from ..observation import Observation
 from ..planned import Entry
-from ..quantity import Quantity
+from ..rig import Rig
 
 CALIBRATED_CENTRE = 0.001
 """u of the principal point of a calibrated camera, in picture widths."""
@@ -92,6 +92,8 @@ class Way:
         output: of the method.
         inputs: from a set-up and a distance to the method's Inputs; raises GeometryError where no picture shows it.
         keys: the entries it needs beside camera and pixel error.
+        lever: the one that is changed together with better knowledge of others, where no change alone is enough; or empty.
+        seen_px: how long what is measured is in the picture, or its disparity, by the Inputs; None where that has no meaning.
         sampling: the Inputs of `ground_sampling` at the middle of the picture; None where it has no meaning.
     """
 
@@ -102,6 +104,8 @@ class Way:
     output: str
     inputs: Callable[[Setup, float], Any]
     keys: tuple[str, ...]
+    lever: str
+    seen_px: Callable[[Any], float] | None = None
     sampling: Callable[[Setup], Any] | None = None
 
     @property
@@ -202,87 +206,45 @@ def _sampling(setup: Setup) -> ground_sampling.Inputs:
 # -- two cameras side by side -------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class StereoInputs:
-    """A rectified pair of pictures, its baseline, and the disparity of a point in the middle.
-
-    Attributes:
-        camera: of both pictures.
-        baseline: between the entrance pupils, m.
-        disparity: x in the left picture less x in the right one, px.
-        principal_point_difference: that of the right picture less that of the left, px.
-    """
-
-    camera: Camera
-    baseline: Quantity
-    disparity: Quantity
-    principal_point_difference: Quantity
-
-
-@dataclass(frozen=True)
-class StereoResult:
-    """Array (...): depth along the axes."""
-
-    depth_m: Array
-    reason: Codes
-
-
-def stereo_depth(inputs: StereoInputs) -> StereoResult:
-    """Depth of a rectified pair, m: Z = f B / (d + offset).
-
-    Source: similar triangles; R. Hartley, A. Zisserman, Multiple View Geometry, 11.12.
-    """
-    shift = np.asarray(inputs.disparity.value) + np.asarray(inputs.principal_point_difference.value)
-    baseline = np.asarray(inputs.baseline.value)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        depth_m = np.asarray(inputs.camera.f_px) * baseline / shift
-    code = reasons(np.shape(depth_m), (np.asarray(~(shift > 0)), Reason.ZERO_EXTENT),
-                   (np.asarray(~(baseline > 0)), Reason.OUT_OF_RANGE))  # fmt: skip
-    return StereoResult(np.where(code == 0, depth_m, np.nan), code)
-
-
-def _stereo_example() -> StereoInputs:
-    """A pair 120 mm apart that sees something at 2.4 m."""
-    camera = Camera(1280, 720, 700.0, 639.5, 359.5, cov=np.diag([1.4**2, 0, 1.0, 1.0]))
-    return StereoInputs(camera, Quantity.interval(0.12, 0.0005, "m"), Quantity.normal(35.0, 0.3, "px"),
-                        Quantity.normal(0.0, 0.2, "px"))  # fmt: skip
-
-
-STEREO = Method(
-    name="stereo",
-    title="two cameras side by side",
-    inputs=StereoInputs,
-    outputs=(Output("depth_m", "depth", "m", "depth (along the axis)"),),
-    function=stereo_depth,
-    assumes=("the pair is rectified", "the point was matched, not mistaken for another"),
-    source="R. Hartley, A. Zisserman, Multiple View Geometry, 11.12",
-    typical="0.5 to 3 %",
-    example=_stereo_example,
-)
-
-
-def _stereo(setup: Setup, distance_m: float) -> StereoInputs:
-    """A point midway between two cameras."""
+def _stereo(setup: Setup, distance_m: float) -> stereo.Inputs:
+    """A point ahead of the middle between two cameras, in rectified pictures."""
     camera, baseline = setup.camera(), setup.entries["baseline"].quantity
-    pixel = setup.entries["pixel"].quantity
+    assert camera.cov is not None
+    rectified = dataclasses.replace(camera, lens="pinhole", distortion=None, cov=camera.cov[:4, :4], id=None)
     disparity = float(camera.f_px) * float(baseline.value) / distance_m
     if disparity > camera.width_px - 1:
         nearest = float(camera.f_px) * float(baseline.value) / (camera.width_px - 1)
         text = f"at {distance_m:.4g} m nothing is in both pictures; the nearest is {nearest:.3g} m away"
         raise GeometryError(text, code="too_near")
-    seen = dataclasses.replace(pixel, value=disparity)
-    return StereoInputs(camera, baseline, seen, setup.entries["offset"].quantity)
+    spot = np.array([[float(camera.cx_px) + disparity / 2, float(camera.cy_px)]])
+    return stereo.Inputs(
+        rig=Rig.of_rectified(rectified, baseline, setup.entries["offset"].quantity, "the set-up"),
+        spot=Observation(spot, 0.0, source="a pixel, as named"),
+        disparity=dataclasses.replace(setup.entries["pixel"].quantity, value=disparity),
+    )
+
+
+def _between_ends(inputs: Any) -> float:
+    """Between two ends, px."""
+    first, second = inputs.ends.points_px
+    return math.hypot(*(second - first))
+
+
+def _disparity(inputs: Any) -> float:
+    return float(inputs.disparity.value)
 
 
 WAYS: dict[str, Way] = {
     way.name: way
     for way in (
-        Way("known_size", "an object of known size", "distance", known_size.METHOD, "range_m", _known_size, ("size", "tilt")),
+        Way("known_size", "an object of known size", "range", known_size.METHOD, "range_m", _known_size, ("size", "tilt"),
+            "size", _between_ends),
         Way("ground", "a point on the ground", "ground distance", ground_plane.METHOD, "ground_distance_m", _ground,
-            ("height", "pitch", "roll", "slope")),
-        Way("stereo", "two cameras side by side", "distance", STEREO, "depth_m", _stereo, ("baseline", "offset")),
-        Way("drone", "the ground from straight above", "length", ground_length.METHOD, "length_m",
-            _from_above, ("height", "pitch", "roll", "slope"), _sampling),
+            ("height", "pitch", "roll", "slope"), "height"),
+        Way("stereo", "two cameras side by side", "depth", stereo.METHOD, "depth_m", _stereo, ("baseline", "offset"), "baseline",
+            _disparity),
+        Way("drone", "the ground from straight above", "length", ground_length.METHOD, "length_m", _from_above,
+            ("height", "pitch", "roll", "slope"), "", _between_ends, _sampling),
     )
 }  # fmt: skip
 """Ways that can be planned, by name."""
