@@ -129,6 +129,24 @@ def test_a_bent_code_is_noted_and_its_covariance_holds():
     assert normalised(bent.seen, corners) < 2.5
 
 
+@pytest.mark.parametrize("spread", [-0.05, 0.1, 0.2])
+def test_ink_that_spread_is_no_size(spread):
+    """Dark modules that grew by a share of a module on every side, drawn 20 times finer."""
+    import cv2
+
+    cells, corners = code(version=2), corners_of(130, turn=0.9, tilt=0.3)
+    fine = np.pad(np.kron(cells, np.ones((20, 20), np.uint8)), 40, constant_values=1).astype(np.uint8)
+    window = np.ones((2 * round(20 * abs(spread)) + 1,) * 2, np.uint8)
+    grown = cv2.erode(fine, window) if spread > 0 else cv2.dilate(fine, window)
+    middle = corners.mean(axis=0)
+    with_margin = homography(len(cells), corners) @ [[-2, -2, len(cells) + 2, len(cells) + 2],
+                                                     [-2, len(cells) + 2, len(cells) + 2, -2], [1, 1, 1, 1]]  # fmt: skip
+    outer = (with_margin[:2] / with_margin[2]).T[[0, 3, 2, 1]]
+    (found,) = qr_codes(picture(grown > 0, outer))
+    assert side(found.seen.points_px) == pytest.approx(side(corners), rel=3e-4)
+    assert normalised(found.seen, corners) < 2.5 and np.hypot(*(found.seen.points_px.mean(axis=0) - middle)) < 0.1
+
+
 def test_two_codes_are_found_left_to_right():
     left = picture(code("left", 1), corners_of(90, middle=(62.0, 128.0)))
     right = picture(code("right", 2), corners_of(100, middle=(190.0, 128.0)))
