@@ -1,11 +1,14 @@
 """Accuracy against truth, into docs/accuracy.md: simulated coverage, the example pictures, and real pictures.
 
 The real pictures lie outside the repository (../shared/data); without them their part of the page is left as it is.
+
+    python benchmarks/accuracy.py [TABLE...]
 """
 
 import json
 import re
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +19,14 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import calibrations  # noqa: E402
 import circles  # noqa: E402
+import ground  # noqa: E402
 import markers  # noqa: E402
+import planes  # noqa: E402
 import sheets  # noqa: E402
 import test_coverage as coverage  # noqa: E402
 import test_real_pictures as real  # noqa: E402
 import test_rim_coverage as rims  # noqa: E402
+import together  # noqa: E402
 
 from subtense import Photo, Quantity, measure_lines, measure_markers, resolve_camera  # noqa: E402
 from subtense.methods import known_distance, known_size, pose, same_plane, sphere  # noqa: E402
@@ -233,28 +239,33 @@ def put(name: str, rows: list[Row]) -> None:
     PAGE.write_text(re.sub(rf"<!-- {name} -->.*?<!-- end -->", lambda _: block, text, flags=re.DOTALL))
 
 
-def main() -> None:
-    """Measure all, and rewrite the page."""
+def april_vision_in_a_folder() -> list[Row]:
+    """`april_vision` with a folder for its camera file."""
     import tempfile
 
-    put("examples", examples())
-    if DATA.is_dir():
-        put("frc2019", frc_2019())
-        put("focal", focal_lengths())
-        with tempfile.TemporaryDirectory() as folder:
-            put("april_vision", april_vision(Path(folder)))
-        put("calibration_real", calibration_real())
-        put("frc2024", frc_2024())
-    put("markers", markers.rows())
-    put("marker_bias", markers.bias_rows())
-    put("circles", circles.rows())
-    put("circles_rendered", circles.rendered())
-    put("sheets", sheets.rows())
-    put("sheets_rendered", sheets.rendered())
-    put("simulated", simulated())
-    put("calibration_spread", calibration_spread())
-    put("calibration_faults", calibration_faults())
+    with tempfile.TemporaryDirectory() as folder:
+        return april_vision(Path(folder))
+
+
+TABLES: dict[str, Callable[[], list[Row]]] = {
+    "examples": examples, "frc2019": frc_2019, "focal": focal_lengths, "april_vision": april_vision_in_a_folder,
+    "calibration_real": calibration_real, "frc2024": frc_2024, "planes_real": planes.pictures, "ground_real": ground.pictures,
+    "markers": markers.rows, "marker_bias": markers.bias_rows, "circles": circles.rows, "circles_rendered": circles.rendered,
+    "sheets": sheets.rows, "sheets_rendered": sheets.rendered, "simulated": simulated, "planes": planes.simulated,
+    "gross_clicks": planes.gross_clicks, "line_cameras": planes.cameras, "ground": ground.simulated, "together": together.rows,
+    "calibration_spread": calibration_spread, "calibration_faults": calibration_faults,
+}  # fmt: skip
+"""What stands between its markers on the page, by their name."""
+REAL = ("frc2019", "focal", "april_vision", "calibration_real", "frc2024", "planes_real", "ground_real")
+"""Those of pictures outside the repository."""
+
+
+def main(names: Sequence[str]) -> None:
+    """Measure the named tables, or all, and rewrite the page."""
+    for name in names or TABLES:
+        if name not in REAL or DATA.is_dir():
+            put(name, TABLES[name]())
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -96,7 +96,7 @@ def _places(method: Method, inputs: Any) -> Model:
 
 
 def measure_together(
-    pairs: Pairs, combination: Combination, *, level: float = 0.95, seed: int = 0, label: str = "",
+    pairs: Pairs, combination: Combination, *, level: float = 0.95, seed: int = 0, draws: int | None = None, label: str = "",
     given: Mapping[str, Any] | None = None, notes: Callable[[], tuple[Note, ...]] = lambda: (),
 ) -> tuple[Measurement, ...]:  # fmt: skip
     """What is calculated from several measurements of one scene, each shared noun moved once.
@@ -106,6 +106,7 @@ def measure_together(
         combination: of their answers.
         level: coverage of the intervals.
         seed: of the draws, where they are needed.
+        draws: how many; None for as many as the adaptive procedure wants.
         label: what is measured.
         given: what to keep with each measurement.
         notes: makes the doubts, once there is an answer.
@@ -118,7 +119,7 @@ def measure_together(
     ready = prepared(pairs)
     space = one_scene([inputs for _, inputs in ready])
     told = Told(combination.name, level, label, given or {}, notes)
-    return measure_model(combined_model(ready, combination), space, combination.outputs, told, seed=seed)
+    return measure_model(combined_model(ready, combination), space, combination.outputs, told, seed=seed, draws=draws)
 
 
 def sample_together(pairs: Pairs, combination: Combination, draws: int, *, seed: int = 0) -> Draws:

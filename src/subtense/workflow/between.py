@@ -38,8 +38,9 @@ _STEP = Combination(
 
 
 def between(
-    first: tuple[Method, Any], second: tuple[Method, Any], *, level: float = 0.95, seed: int = 0, label: str = ""
-) -> tuple[Measurement, ...]:
+    first: tuple[Method, Any], second: tuple[Method, Any], *, level: float = 0.95, seed: int = 0, draws: int | None = None,
+    label: str = "",
+) -> tuple[Measurement, ...]:  # fmt: skip
     """The straight distance between what two methods placed, and how much deeper the second is.
 
     Args:
@@ -47,6 +48,7 @@ def between(
         second: likewise; nouns that are the same in both (the camera, a reference) are moved together.
         level: coverage of the intervals.
         seed: of the draws.
+        draws: how many; None for as many as two digits of u need.
         label: what is measured.
 
     Returns:
@@ -60,15 +62,18 @@ def between(
     kept = {name: {"method": method.name, "given": given(inputs)} for name, (method, inputs) in zip(("first", "second"), pairs,
                                                                                                     strict=True)}  # fmt: skip
     length, deeper = measure_together(
-        pairs, BETWEEN, level=level, seed=seed, label=label, given=kept, notes=lambda: _doubts(pairs)
+        pairs, BETWEEN, level=level, seed=seed, draws=draws, label=label, given=kept, notes=lambda: _doubts(pairs)
     )
-    drawn = sample_together(pairs, _STEP, DRAWS, seed=seed).values
+    drawn = sample_together(pairs, _STEP, draws or DRAWS, seed=seed).values
     answered = drawn[:, np.isfinite(drawn).all(axis=0)]
     nominal = _step_of(pairs)
-    if answered.shape[1] < 0.99 * DRAWS or length.value >= unresolved.RESOLVED * unresolved.largest_sigma(answered):
+    if answered.shape[1] < 0.99 * drawn.shape[1] or length.value >= unresolved.RESOLVED * unresolved.largest_sigma(
+        answered
+    ):
         return length, deeper
     low, high = unresolved.interval(nominal, nominal[:, None] - answered, level)
-    return _inverted(length, low, high, level), deeper
+    how = f"law of the observed length inverted, {drawn.shape[1]} draws"
+    return _inverted(dataclasses.replace(length, evaluation=how), low, high, level), deeper
 
 
 def _inverted(length: Measurement, low: float, high: float, level: float) -> Measurement:
@@ -84,8 +89,7 @@ def _inverted(length: Measurement, low: float, high: float, level: float) -> Mea
                 "interval allows for it")  # fmt: skip
         cure = "place both more closely, or measure the length between them by one method, as in a plane"
         notes = (*notes, Note("length_not_resolved", text, cure))
-    return dataclasses.replace(length, low=min(low, length.value), high=high, u=u, notes=notes,
-                               evaluation=f"law of the observed length inverted, {DRAWS} draws")  # fmt: skip
+    return dataclasses.replace(length, low=min(low, length.value), high=high, u=u, notes=notes)
 
 
 def _step_of(pairs: Sequence[tuple[Method, Any]]) -> Array:

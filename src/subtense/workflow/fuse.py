@@ -43,8 +43,8 @@ class Fused:
 
 
 def fuse(
-    pairs: Sequence[tuple[Method, Any]], what: str | None = None, *, level: float = 0.95, seed: int = 0, label: str = "",
-    labels: Sequence[str] = (),
+    pairs: Sequence[tuple[Method, Any]], what: str | None = None, *, level: float = 0.95, seed: int = 0, draws: int | None = None,
+    label: str = "", labels: Sequence[str] = (),
 ) -> Fused:  # fmt: skip
     """The weighted mean of what several methods say of one number.
 
@@ -57,6 +57,7 @@ def fuse(
         what: the output that all of them have; the first that they share where it is None.
         level: coverage of the interval.
         seed: of the draws.
+        draws: how many; None for as many as two digits of u need.
         label: what is measured.
         labels: of each, for the notes.
 
@@ -72,9 +73,10 @@ def fuse(
     outputs = _outputs(pairs, what)
     ready = [(method, method.prepare(inputs)) for method, inputs in pairs]
     each = tuple(
-        _alone(pair, output, level, seed, name) for pair, (output, _), name in zip(ready, outputs, names, strict=True)
+        _alone(pair, output, level, seed, draws, name)
+        for pair, (output, _), name in zip(ready, outputs, names, strict=True)
     )
-    values, cov = np.array([m.value for m in each]), _covariance(ready, [row for _, row in outputs])
+    values, cov = np.array([m.value for m in each]), _covariance(ready, [row for _, row in outputs], draws or DRAWS)
     kept, notes = _kept(values, cov, names, each)
     weights = np.zeros(len(values))
     weights[kept] = _weights(cov[np.ix_(kept, kept)])
@@ -91,7 +93,7 @@ def fuse(
         f"part_{i}": {"method": method.name, "given": given(inputs)} for i, (method, inputs) in enumerate(pairs, 1)
     }
     (one,) = measure_together(
-        ready, Combination("fuse", (output,), mean), level=level, seed=seed, label=label, given=kept_given
+        ready, Combination("fuse", (output,), mean), level=level, seed=seed, draws=draws, label=label, given=kept_given
     )
     freedom = len(kept) - 1
     one, widened = _widened(one, chi2, freedom, names, values)
@@ -132,18 +134,22 @@ def _outputs(pairs: Sequence[tuple[Method, Any]], what: str | None) -> list[tupl
     return found
 
 
-def _alone(pair: tuple[Method, Any], output: Output, level: float, seed: int, name: str) -> Measurement:
+def _alone(
+    pair: tuple[Method, Any], output: Output, level: float, seed: int, draws: int | None, name: str
+) -> Measurement:
     method, inputs = pair
-    return next(m for m in measure(method, inputs, level=level, seed=seed, label=name) if m.what == output.what)
+    return next(
+        m for m in measure(method, inputs, level=level, seed=seed, draws=draws, label=name) if m.what == output.what
+    )
 
 
-def _covariance(ready: Sequence[tuple[Method, Any]], rows: Sequence[int]) -> Array:
+def _covariance(ready: Sequence[tuple[Method, Any]], rows: Sequence[int], draws: int = DRAWS) -> Array:
     """Of the wanted output of each: by draws, as u from draws is what counts where a response bends."""
-    _, drawn = joint(ready, draws=DRAWS)
+    _, drawn = joint(ready, draws=draws)
     starts = np.cumsum([0, *(len(method.outputs) for method, _ in ready)])
     values = drawn.values[[int(start) + row for start, row in zip(starts, rows, strict=False)]]
     whole = values[:, np.isfinite(values).all(axis=0)]
-    if whole.shape[1] < 0.9 * DRAWS:
+    if whole.shape[1] < 0.9 * draws:
         raise InputError("fuse", "measurements with an open interval", "leave out what has no finite interval")
     return np.atleast_2d(np.cov(whole))
 
