@@ -154,9 +154,9 @@ def _as_seen(solution: Adjusted, richer: Adjusted) -> Array:
     """How far the global unknowns of the leaner model would move for its cameras to look as the richer ones where points were seen.
 
     Coefficients of unlike models can't be subtracted, directions can: pixels of the richer camera's directions are explained by
-    the leaner model's numbers and a turn of the camera.
+    the leaner model's numbers and a turn of the camera. Of a rig, the turns are a part of how the cameras stand to each other.
     """
-    shift = np.zeros(solution.problem.size)
+    shift, turns = np.zeros(solution.problem.size), []
     for index, model in enumerate(solution.problem.models):
         block, theta = solution.problem.blocks[index], solution.state.intrinsics[index]
         seen = block.seen_px[block.weight > 0]
@@ -170,8 +170,12 @@ def _as_seen(solution: Adjusted, richer: Adjusted) -> Array:
             0
         ]
         shift[[first + i for i in own]] = found[: len(own)]
+        turns.append(found[len(own) :])
     at = solution.first(len(solution.problem.models))
     moved = _shift_of_poses(solution, richer)
+    for index, pose in enumerate(richer.state.relative):
+        moved[6 * index : 6 * index + 3] += turns[index + 1] - pose.rotation @ turns[0]
+        moved[6 * index + 3 : 6 * index + 6] += np.cross(turns[index + 1], pose.translation_m)
     shift[at : at + moved.size] = moved
     return shift
 

@@ -34,6 +34,7 @@ _ELSEWHERE = {
     "plan": "plan",
     "triangulate": "scenes",
     "plane": "plane",
+    "stereo": "stereo",
 }
 """Commands by the module of `commands` that has them; it is loaded when one of them is asked for."""
 

@@ -8,6 +8,7 @@ Source: A. Fusiello, E. Trucco, A. Verri, A compact algorithm for rectification 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,8 @@ from .rig import Rig
 
 MOST_TURN_RAD = 0.7
 """Between a camera's axis and the rectified one: beyond it the pictures would be torn apart."""
+MAP_STEP_PX, OUTSIDE = 4, -1e5
+"""Lens distortion is straight to a hundredth of a pixel over so many pixels."""
 SAME = 1e-6
 """Relative difference up to which two numbers of a rig that is rectified already are one."""
 
@@ -71,11 +74,12 @@ class Rectified:
     def _seen(self, picture: Pixels, camera: Camera, rect_from_camera: Array, cx_px: float) -> Pixels:
         import cv2
 
-        x, y = np.meshgrid(np.arange(self.width_px, dtype=float), np.arange(self.height_px, dtype=float))
-        ways = np.stack([(x - cx_px) / self.f_px, (y - self.cy_px) / self.f_px, np.ones_like(x)], -1)
-        places = camera.project((ways @ rect_from_camera).reshape(-1, 3)).reshape(*x.shape, 2)
-        places = np.nan_to_num(places, nan=-1e4).clip(-1e4, 1e6).astype(np.float32)
-        return np.asarray(cv2.remap(picture, places[..., 0], places[..., 1], cv2.INTER_CUBIC, borderValue=0))
+        def places(points: Array) -> Array:
+            ways = np.column_stack([(points - [cx_px, self.cy_px]) / self.f_px, np.ones(len(points))])
+            return camera.project(ways @ rect_from_camera)
+
+        maps = smooth_map(places, self.width_px, self.height_px, MAP_STEP_PX)
+        return np.asarray(cv2.remap(picture, maps[0], maps[1], cv2.INTER_CUBIC, borderValue=0))
 
     # -- pixels ------------------------------------------------------------------------------------------
 
@@ -185,3 +189,32 @@ def _turned(rig: Rig, place: Array) -> Rectified:
     cy = float((centres[0][1] + centres[1][1]) / 2)
     return Rectified(rig, f, float(centres[0][0]), cy, float(centres[1][0] - centres[0][0]), rig.baseline_m,
                      rect_from_left, rect_from_right, False)  # fmt: skip
+
+
+def smooth_map(function: Callable[[Array], Array], width_px: int, height_px: int, step_px: int = 8) -> Any:
+    """(k, height, width) float32 values of a smooth function of pixels, evaluated at some and interpolated between them.
+
+    Args:
+        function: (n, 2) pixels to (n, k); NaN counts as far outside.
+        width_px: of the picture.
+        height_px: likewise.
+        step_px: between the pixels at which it is evaluated.
+    """
+    across, down = (max(2, -(-side // step_px) + 1) for side in (width_px, height_px))
+    x, y = np.meshgrid(np.linspace(0, width_px - 1, across), np.linspace(0, height_px - 1, down))
+    found = np.nan_to_num(
+        np.asarray(function(np.stack([x, y], -1).reshape(-1, 2))), nan=OUTSIDE, posinf=OUTSIDE, neginf=OUTSIDE
+    )
+    grid = found.reshape(down, across, -1).astype(np.float32)
+    over, under = _weights(width_px, across), _weights(height_px, down)
+    return np.stack([under @ grid[..., i] @ over.T for i in range(grid.shape[-1])])
+
+
+def _weights(count: int, knots: int) -> Any:
+    """(count, knots) weights of linear interpolation. OpenCV's remap would round places to a thirty-second of the knots' distance."""
+    at = np.linspace(0, knots - 1, count)
+    first = np.minimum(at.astype(int), knots - 2)
+    found = np.zeros((count, knots), np.float32)
+    found[np.arange(count), first] = 1 - (at - first)
+    found[np.arange(count), first + 1] = at - first
+    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
@@ -78,6 +78,18 @@ class Rig(Noun):
         """Its standard deviation."""
         along = self.right_from_left.translation_m / self.baseline_m
         return float(np.sqrt(along @ self.cov[-3:, -3:] @ along))
+
+    def resized(self, width_px: int, height_px: int) -> Rig:
+        """The rig of both pictures resampled to another size."""
+        jacobian = np.eye(len(self.cov))
+        cameras, first = [], 0
+        for camera in (self.left, self.right):
+            sx, sy = width_px / camera.width_px, height_px / camera.height_px
+            at = range(first, first + 4)
+            jacobian[at, at] = sx, sy / sx, sx, sy
+            cameras.append(camera.resized(width_px, height_px))
+            first += 4 + camera.coefficients.shape[-1]
+        return replace(self, left=cameras[0], right=cameras[1], cov=jacobian @ self.cov @ jacobian.T, id=None)
 
     # -- as a noun -----------------------------------------------------------------------------------
 
