@@ -25,7 +25,7 @@ NEARLY_BEST = 1.02
 """Values whose error is within that of the smallest one count as alike: the nearest to the present one is named."""
 DRAWS = 20_000
 """Of one value that is tried, where draws are needed; the same for all, so that the error runs smoothly."""
-FINE = 1e-4
+FINE = 3e-4
 """Relative step to which a crossing is found."""
 TIMES_DISTANCE = 100.0
 """How much nearer and farther than the planned distance is tried."""
@@ -208,7 +208,7 @@ def _with_lowest(tried: _Tried, grid: list[float], ratios: list[float]) -> tuple
     i = int(np.argmin(ratios))
     between = math.log(grid[max(i - 1, 0)]), math.log(grid[min(i + 1, len(grid) - 1)])
     found = minimize_scalar(lambda t: min(tried.ratio(math.exp(t)), 1e6), bounds=between, method="bounded",
-                            options={"xatol": 1e-3, "maxiter": 25})  # fmt: skip
+                            options={"xatol": 0.02, "maxiter": 12})  # fmt: skip
     grid = sorted({*grid, math.exp(float(found.x))})
     return grid, [tried.ratio(x) for x in grid]
 

@@ -141,7 +141,7 @@ def _allowed(half_width: Callable[[float], float], now: float, share_m: float) -
     if half_width(now) <= share_m:
         return now
     low, high = math.log(now * LEAST_SHARE), math.log(now)
-    while high - low > 1e-3:
+    while high - low > 5e-3:
         middle = (low + high) / 2
         if half_width(math.exp(middle)) <= share_m:
             low = middle
