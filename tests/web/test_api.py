@@ -778,3 +778,18 @@ def test_who_leaves_a_job_early_stops_nothing(server, desk):
 def test_the_file_of_a_sent_photo_is_not_kept(server):
     held = server.photo(picture(40, 30, seed=77))
     assert error(server.client.get(f"/api/photos/{held['id']}/file"), 404)["type"] == "Absent"
+
+
+def test_distances_between_items_and_one_number_from_several(server, desk):
+    line = {"method": "known_size", "inputs": {"ends": "100,100;400,100 ± 1px", "size": "300 ± 3 mm"}, "label": "near"}
+    other = {"method": "known_size", "inputs": {"ends": "900,700;1000,700 ± 1px", "size": "300 ± 3 mm"}, "label": "far"}
+    body = {"photo": desk["id"], "items": [line, other], "between": ["1,2"]}
+    found = server.client.post("/api/measure", json=body).json()["measurements"]
+    length = next(m for m in found if m["method"] == "between" and m["what"] == "length")
+    assert length["label"] == "near to far" and length["low"] < length["value"] < length["high"]
+    twice = {**body, "items": [line, {**line, "label": "again"}], "between": [], "same": ["near,again"]}
+    found = server.client.post("/api/measure", json=twice).json()["measurements"]
+    assert next(m for m in found if m["method"] == "fuse")["label"] == "near and again"
+    for field, text in (("between", "1,9"), ("same", "near"), ("between", "nobody,near")):
+        told = error(server.client.post("/api/measure", json={**body, "between": [], field: [text]}))
+        assert told["name"] == field

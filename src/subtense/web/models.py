@@ -124,6 +124,13 @@ class Sheet(_Evaluated):
     photo: PhotoId
     camera: GivenCamera = None
     items: Annotated[list[Item], Field(max_length=200)] = Field(default_factory=list)
+    between: Annotated[
+        list[Typed],
+        Field(max_length=20, description="pairs of items whose distance is wanted, by labels or numbers: 1,2"),
+    ] = Field(default_factory=list)
+    same: Annotated[list[Typed], Field(max_length=20, description="items that are one and the same thing: 1,2")] = (
+        Field(default_factory=list)
+    )
 
     model_config = _shown({"photo": _ID, "items": [{"method": "known_size", "inputs": {
         "ends": "120,80;640,80", "size": "200 mm"}, "label": "shelf"}]})  # fmt: skip

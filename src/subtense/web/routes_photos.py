@@ -26,6 +26,7 @@ from ..workflow.in_photo import Item, measure_item, measure_items
 from ..workflow.measure import camera_document, no_camera_document
 from ..workflow.snap import snapped
 from ..workflow.tables import DETECTORS, METHODS
+from ..workflow.together import with_distances, with_fused
 from . import answers as shapes
 from . import models
 from .children import unwatched
@@ -178,12 +179,19 @@ def _known(camera: Any) -> Any:
 @router.post("/measure", summary="All that was measured in a photo, as one document",
              responses=answers(ref("document"), more=reports()))  # fmt: skip
 def post_sheet(request: Request, body: models.Sheet, form: Format = "json") -> Response:
-    """An item that has no answer becomes a note `refused`, and does not lose the others."""
+    """An item that has no answer becomes a note `refused`, and does not lose the others.
+
+    `between` adds the distances of pairs of items, `same` one number from several, what they share treated as common.
+    """
     photo = held(request, body.photo)
     items = [Item(_method(one.method), one.inputs, one.label, _notes(one.notes), judged=True) for one in body.items]
     document = measure_items(
         items, photo.photo, camera_for(state_of(request), photo, body.camera), level=body.level, seed=body.seed
     )
+    for text in body.same:
+        document = with_fused(document, text, option="same", level=body.level, seed=body.seed)
+    for text in body.between:
+        document = with_distances(document, text, option="between", level=body.level, seed=body.seed)
     return shown(document, form, photo.photo)
 
 

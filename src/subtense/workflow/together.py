@@ -76,12 +76,15 @@ def chosen(things: Sequence[Thing], text: str, option: str) -> list[Thing]:
     return found
 
 
-def with_distances(document: Document, text: str, *, level: float = 0.95, seed: int = 0) -> Document:
+def with_distances(
+    document: Document, text: str, *, option: str = "--between", level: float = 0.95, seed: int = 0
+) -> Document:
     """The document with the distances between things.
 
     Args:
         document: of one picture.
         text: two things, as "1,2" or "marker 1; cup", or "all".
+        option: what an error calls the text.
         level: coverage of the intervals.
         seed: of the draws.
 
@@ -93,11 +96,11 @@ def with_distances(document: Document, text: str, *, level: float = 0.95, seed: 
         placed = [thing for thing in things if thing.method.place is not None and not thing.check]
         pairs = list(itertools.combinations(placed, 2))
         if not 1 <= len(pairs) <= MOST_PAIRS:
-            raise InputError("--between", f"all, with {len(placed)} things", "name two things, as --between 1,2")
+            raise InputError(option, f"all, with {len(placed)} things", "name two things that have a range, as 1,2")
     else:
-        two = chosen(things, text, "--between")
+        two = chosen(things, text, option)
         if len(two) != 2:
-            raise InputError("--between", text, "give two things; repeat --between for more")
+            raise InputError(option, text, "give two things; repeat it for more")
         pairs = [(two[0], two[1])]
     found: list[Measurement] = []
     shapes: list[Shape] = []
@@ -116,9 +119,11 @@ def _middle(document: Document, label: str) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def with_fused(document: Document, text: str, *, level: float = 0.95, seed: int = 0) -> Document:
+def with_fused(
+    document: Document, text: str, *, option: str = "--same", level: float = 0.95, seed: int = 0
+) -> Document:
     """The document with one number from several things that are one and the same, as "1,2"."""
-    named = chosen(things_of(document), text, "--same")
+    named = chosen(things_of(document), text, option)
     label = " and ".join(thing.label or "line" for thing in named)
     one = fuse([t.pair for t in named], level=level, seed=seed, label=label, labels=[t.label for t in named]).one
     return dataclasses.replace(document, measurements=(*document.measurements, *improved((one,))))
