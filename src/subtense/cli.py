@@ -32,6 +32,7 @@ _ELSEWHERE = {
     "fuse": "together",
     "methods": "together",
     "plan": "plan",
+    "reconstruct": "scenes",
     "triangulate": "scenes",
     "plane": "plane",
     "stereo": "stereo",

@@ -161,17 +161,28 @@ class Views(Noun):
         """The camera of a view."""
         return self.cameras[self.of_view[view]]
 
+    def numbers_of(self, names: Sequence[str]) -> list[int]:
+        """Which numbers of the covariance are those of these pictures: their places, then their cameras."""
+        picked = [self.index(name) for name in dict.fromkeys(names)]
+        cameras = sorted({self.of_view[i] for i in picked})
+        places = [_PLACE * i + k for i in picked for k in range(_PLACE)]
+        return places + [k for c in cameras for k in range(self.starts[c], self.starts[c + 1])]
+
     def subset(self, names: Sequence[str]) -> Views:
         """These pictures only, in this order, with their joint covariance."""
         picked = [self.index(name) for name in dict.fromkeys(names)]
         cameras = sorted({self.of_view[i] for i in picked})
-        rows = [6 * i + k for i in picked for k in range(6)]
-        rows += [k for c in cameras for k in range(self.starts[c], self.starts[c + 1])]
+        rows = self.numbers_of(names)
         return replace(
             self, names=tuple(self.names[i] for i in picked), cameras=tuple(self.cameras[c] for c in cameras),
             rotation=self.rotation[..., picked, :, :], centre_m=self.centre_m[..., picked, :],
             camera_of=tuple(cameras.index(self.of_view[i]) for i in picked), cov=self.covariance[np.ix_(rows, rows)], id=None,
         )  # fmt: skip
+
+    @property
+    def nominal(self) -> Array:
+        """(n,) the numbers of the covariance: places count from where they are."""
+        return np.concatenate([np.zeros(_PLACE * len(self.names)), *(camera._vector() for camera in self.cameras)])
 
     @property
     def places_m(self) -> Array:
@@ -188,7 +199,7 @@ class Views(Noun):
         found = []
         if self.u_scale:
             found.append(Part("scale", "scale", self.scale_source, np.ones(1), np.array([self.u_scale])))
-        nominal = np.concatenate([np.zeros(_PLACE * len(self.names)), *(camera._vector() for camera in self.cameras)])
+        nominal = self.nominal
         for names, rows in self._independent():
             cov = self.covariance[np.ix_(rows, rows)]
             diagonal = not np.any(cov - np.diag(np.diag(cov)))
@@ -309,7 +320,7 @@ class Track(Noun):
     """One point of the scene in several pictures.
 
     Attributes:
-        names: of the pictures it is seen in.
+        names: of the pictures it is seen in; of one picture without a point, it is the place where that was taken.
         seen: point i lies in picture i.
         id: given, or the digest of the content.
     """
@@ -321,17 +332,28 @@ class Track(Noun):
     widget: ClassVar[str] = "text"
 
     def __post_init__(self) -> None:
-        if len(self.names) != self.seen.points_px.shape[-2] or len(set(self.names)) != len(self.names):
+        place = len(self.names) == 1 and self.seen.points_px.shape[-2] == 0
+        if not place and (len(self.names) != self.seen.points_px.shape[-2] or len(set(self.names)) != len(self.names)):
             raise InputError(
                 "track", ", ".join(self.names), "give one point in each picture, as 'a.jpg:120,80; b.jpg:95,82'"
             )
+
+    @classmethod
+    def place(cls, name: str) -> Self:
+        """The place where a picture was taken."""
+        return cls((name,), Observation(np.zeros((0, 2)), 0.0, label=name))
+
+    @property
+    def is_place(self) -> bool:
+        """Whether it is the place of a picture rather than a point in some."""
+        return bool(self.seen.points_px.shape[-2] == 0)
 
     @property
     def leading(self) -> tuple[int, ...]:
         return self.seen.leading
 
     def parts(self) -> tuple[Part, ...]:
-        return self.seen.parts()
+        return () if self.is_place else self.seen.parts()
 
     def moved(self, values: Mapping[str, Array]) -> Self:
         return self._with(seen=self.seen.moved(values))
