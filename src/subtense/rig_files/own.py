@@ -67,9 +67,6 @@ def _notes(data: Any) -> list[Note]:
             continue
         said = [item.get("code"), item.get("text", item.get("message")), item.get("cure", "")]
         if all(isinstance(word, str) for word in said) and said[0]:
-            found.append(
-                Note(
-                    **dict(zip(("code", "text", "cure"), (" ".join(word.split())[:500] for word in said), strict=True))
-                )
-            )
+            code, text, cure = (" ".join(word.split())[:500] for word in said)
+            found.append(Note(code, text, cure))
     return found
