@@ -2,9 +2,10 @@
 
 Truths: HGU-CGV height estimation (door 202 cm, lockers 182 cm, taped); coins of the US mint (24.26 and 21.21 mm) beside a business card of
 3.5 x 2 in; a computer mouse of 65 mm on a board with a chessboard of 33 mm squares, 70 cm away by hand; a step of about 17 cm (6 %) behind
-a bank card.
+a bank card; four stakes on a river's water line, all six distances measured.
 """
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,7 +146,37 @@ def step(data):
     yield Case("step and card", "height of the step", propagate.measure(plane.METHOD, inputs)[0], 0.17, 0.06 * 0.17)
 
 
-PICTURES = (corridor, coins, board, step)
+# -- a water line: four stakes, five of their distances place them, the sixth is measured in the picture ------------------
+
+
+def beside(r1, r3, base, side):
+    """The point r1 from the origin and r3 from (base, 0), on one side of the line between them."""
+    x = (r1**2 - r3**2 + base**2) / (2 * base)
+    return x, side * np.sqrt(r1**2 - x**2), 0.0
+
+
+def water_line(data):
+    folder = data / "ground_plane" / "river_pisco"
+    told = json.loads((folder / "truth.json").read_text())
+    photo = Photo.load(folder / "pisco.jpg")
+    base = told["d13"]
+    stakes = np.array(
+        [(0, 0, 0), beside(told["d12"], told["d23"], base, 1), (base, 0, 0), beside(told["d41"], told["d34"], base, -1)]
+    )
+    seen = clicks(*(told["px"][name] for name in "1234"))
+    frame = Observation(np.array([[-0.5, -0.5], [photo.width_px - 0.5, photo.height_px - 0.5]]), 0.0)
+    across = clicks(told["px"]["2"], told["px"]["4"])
+    inputs = plane.Inputs(seen, Target("stakes", stakes, sigma_m=0.03), across, frame=frame)
+    yield Case(
+        "river, stakes on the water line",
+        "sixth distance",
+        propagate.measure(plane.METHOD, inputs)[0],
+        told["d24"],
+        0.05,
+    )
+
+
+PICTURES = (corridor, coins, board, step, water_line)
 
 
 @pytest.mark.parametrize("picture", PICTURES)
