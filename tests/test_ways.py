@@ -93,6 +93,16 @@ def test_distances_between_lines(photo):
     assert any(m["method"] == "between" for m in measured(photo, *words, "--between", "all"))
 
 
+def test_what_checks_another_has_no_number(photo):
+    words = ("--line", person(8, x=-1), "--line", person(11, x=2), "--size", "1.75 ± 0.01 m", *STANDS)
+    found = measured(photo, *words, "--between", "1,2")
+    assert next(m["label"] for m in found if m["method"] == "between") == "line 1 to line 2"
+    other = next(m["label"] for m in found if ", by " in m["label"])
+    both = measured(photo, *words, "--same", f"line 1; {other}")
+    fused = next(m for m in both if m["method"] == "fuse")
+    assert fused["u"] < min(m["u"] for m in both if m["what"] == "range" and m["label"] in ("line 1", other))
+
+
 def test_one_size_for_all_lines_is_one_doubt(photo):
     """A size that is wrong by 1 % moves both by 1 %: it counts once in the distance between them."""
     words = ("--line", person(10), "--line", person(20), "--between", "1,2")

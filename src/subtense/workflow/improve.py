@@ -53,6 +53,8 @@ def improve(m: Measurement) -> str:
     """One sentence: the largest line, what u would be without it, and what lessens it; empty where there is no budget."""
     if not m.budget or m.u is None:
         return ""
+    if m.method == "fuse" and any(note.code == "methods_disagree" for note in m.notes):
+        return "find out which of the measurements is wrong; what they consist of says less than that they contradict each other."
     top = m.budget[0]
     name, factor = fitting_unit(m.value, m.unit)
     rest = m.u * math.sqrt(max(1 - top.share, 0.0)) / factor

@@ -60,15 +60,16 @@ def chosen(things: Sequence[Thing], text: str, option: str) -> list[Thing]:
         InputError: fewer than two, or one that there is not.
     """
     words = [word.strip() for word in re.split(";" if ";" in text else ",", text) if word.strip()]
-    known = "; ".join(f"{number}: {thing.label or 'the line'}" for number, thing in enumerate(things, 1))
+    counted = [thing for thing in things if not thing.check]  # what checks another has no number of its own
+    known = "; ".join(f"{number}: {thing.label or 'the line'}" for number, thing in enumerate(counted, 1))
     found = []
     for word in words:
         by_label = [thing for thing in things if thing.label == word]
         number = int(word) if word.isdecimal() and len(word) < 6 else 0
         if by_label:
             found.append(by_label[0])
-        elif 1 <= number <= len(things):
-            found.append(things[number - 1])
+        elif 1 <= number <= len(counted):
+            found.append(counted[number - 1])
         else:
             raise InputError(option, word, f"give numbers or names of what was measured ({known})")
     if len({thing.label for thing in found}) < 2 or len(found) != len({thing.label for thing in found}):
