@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 
 _ELSEWHERE = {
+    "depth": "depth",
+    "depth-models": "depth",
     "ground": "ground",
     "fuse": "together",
     "methods": "together",
@@ -51,7 +53,9 @@ class _Group(click.Group):
             return super().get_command(ctx, cmd_name)
         from importlib import import_module
 
-        found: click.Command = getattr(import_module(f".commands.{_ELSEWHERE[cmd_name]}", __package__), cmd_name)
+        found: click.Command = getattr(
+            import_module(f".commands.{_ELSEWHERE[cmd_name]}", __package__), cmd_name.replace("-", "_")
+        )
         return found
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -72,14 +72,21 @@ class Network:
         between: names of tensors given and of tensors wanted, where only that part of a TFLite network is run.
     """
 
-    def __init__(self, path: str | Path, between: tuple[tuple[str, ...], tuple[str, ...]] | None = None) -> None:
+    def __init__(
+        self, path: str | Path, between: tuple[tuple[str, ...], tuple[str, ...]] | None = None, most_bytes: int = MOST_BYTES
+    ) -> None:  # fmt: skip
         """Look at the file; it is opened by an engine when something is asked of it.
+
+        Args:
+            path: the file.
+            between: see the class.
+            most_bytes: larger files are refused.
 
         Raises:
             FileFormatError: no such file, too large, or neither TFLite nor ONNX.
         """
         self.path, self.between = Path(path), between
-        self.kind = _kind(self.path)
+        self.kind = _kind(self.path, most_bytes)
         self._kept = threading.local()
 
     @property
@@ -144,15 +151,15 @@ class Network:
         return engine
 
 
-def _kind(path: Path) -> str:
+def _kind(path: Path, most_bytes: int) -> str:
     try:
         size = path.stat().st_size
         with path.open("rb") as file:
             head = file.read(8)
     except OSError as error:
         raise FileFormatError(path, f"cannot be read: {error.strerror}") from None
-    if size > MOST_BYTES:
-        raise FileFormatError(path, f"has {size / 2**20:.0f} MiB; a network of up to {MOST_BYTES // 2**20} MiB is run")
+    if size > most_bytes:
+        raise FileFormatError(path, f"has {size / 2**20:.0f} MiB; a network of up to {most_bytes // 2**20} MiB is run")
     if head[4:8] == b"TFL3":
         return "tflite"
     if head[:1] == b"\x08" and len(head) == 8:  # protobuf: field 1, the version of ONNX's format

@@ -12,6 +12,7 @@ from ..method import Method
 from ..methods import (
     calculator,
     circle,
+    depth_map,
     ground_footprint,
     ground_length,
     ground_plane,
@@ -61,6 +62,7 @@ METHODS: dict[str, Method] = {
         plane_conditions.ANGLE,
         height.METHOD,
         wall.METHOD,
+        depth_map.METHOD,
         stereo.METHOD,
         stereo.LENGTH,
         triangulation.METHOD,
