@@ -25,9 +25,11 @@ def enclosed_area(places: Array) -> Array:
 
 def angle_between(one: Array, other: Array) -> Array:
     """(...) angle between vectors (..., 2 or 3), 0 to pi rad."""
-    dot = np.sum(one * other, -1)
-    across = np.sqrt(np.maximum(np.sum(one**2, -1) * np.sum(other**2, -1) - dot**2, 0.0))
-    return np.asarray(np.arctan2(across, dot))
+    if one.shape[-1] == 2:
+        across = abs(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+    else:
+        across = np.sqrt(np.sum(np.cross(one, other) ** 2, -1))
+    return np.asarray(np.arctan2(across, np.sum(one * other, -1)))
 
 
 def crosses(points: Array) -> bool:

@@ -168,7 +168,7 @@ def _several(
     rough = _apart(rough, cost)
     if not len(rough):
         return None
-    whiten = _weights(rectified, nouns, scene, rough[0])
+    whiten, _ = _weights(rectified, nouns, scene, rough[0])
     numbers, chi2, _ = solved(rectified, rough, seen, whiten, COARSE)
     rough = _apart(numbers[chi2 < chi2.min() + HOPELESS], chi2[chi2 < chi2.min() + HOPELESS])
     for _ in range(ROUNDS):
@@ -179,7 +179,8 @@ def _several(
         if again:
             break
         near = chi2 < chi2[0] + 100 * SECOND
-        whiten, rough = _weights(rectified, nouns, scene, numbers[0]), _apart(numbers[near], chi2[near])
+        whiten, _ = _weights(rectified, nouns, scene, numbers[0])
+        rough = _apart(numbers[near], chi2[near])
     return numbers, chi2, settled, whiten
 
 
@@ -260,8 +261,8 @@ def solved(rectified: Rectified, starts: Array, seen: Scene, whiten: Array, step
     return numbers, cost, settled
 
 
-def _weights(rectified: Rectified, nouns: Sequence[Noun | None], scene: Numbers, numbers: Array) -> Array:
-    """(R, C) inverse root of the covariance of the conditions at a plane; what follows from others has no weight of its own."""
+def _weights(rectified: Rectified, nouns: Sequence[Noun | None], scene: Numbers, numbers: Array) -> tuple[Array, Array]:
+    """(R, C) inverse root of the covariance of the conditions at a plane, without what follows from others, and that of clicks alone."""
 
     def off(*moved: Noun | None) -> Array:
         one = scene(*moved)
@@ -272,12 +273,16 @@ def _weights(rectified: Rectified, nouns: Sequence[Noun | None], scene: Numbers,
     points = nouns[0]
     assert isinstance(points, Observation)
     exact = replace(points, sigma_px=FLOOR_PX, cov=None, id=None)
-    cov = cov + covariance_by((exact,), lambda p: off(p, *nouns[1:]), count)
-    # a length that is stated exactly still has a weight
-    root = np.sqrt(np.maximum(np.diag(cov), 1e-20))
-    values, vectors = np.linalg.eigh(cov / np.outer(root, root))
+    floor = covariance_by((exact,), lambda p: off(p, *nouns[1:]), count)
+    # what follows from what is told by clicks alone: a lens that bends all conditions together makes none of them follow from others
+    stated = np.array([one.kind in KNOWN for one in rectified.conditions.each])
+    alone = floor + np.diag(np.diag(floor) * stated)
+    root = np.sqrt(np.maximum(np.diag(alone), 1e-20))
+    values, vectors = np.linalg.eigh(alone / np.outer(root, root))
     keep = values > SAME
-    return np.asarray((vectors[:, keep] / np.sqrt(values[keep])).T / root)
+    basis = (vectors[:, keep] / np.sqrt(values[keep])).T / root
+    whiten = np.linalg.inv(np.linalg.cholesky(basis @ (cov + floor) @ basis.T)) @ basis
+    return np.asarray(whiten), np.asarray(basis)
 
 
 def _judged(
@@ -292,15 +297,10 @@ def _judged(
         return undetermined
     if freedom == 0 and chi2[0] > 1e-6:  # just enough of independent conditions are met exactly
         return undetermined if chi2[0] < chi2_limit(1) else none
-    _, values, vectors = np.linalg.svd(jacobian)
-    weakest = vectors[-1]
-
-    def told(*moved: Noun | None) -> Array:
-        one = scene(*moved)
-        return np.asarray(whiten @ rectified.slopes(best, one.flat, one.known) @ weakest)
-
-    noise = float(np.trace(covariance_by(nouns, told, len(whiten))))
-    if not values[-1] ** 2 > max(LEVERAGE * noise, 1e-12):
+    # by the weights of clicks too: a lens that weakens a number must not be all that it is compared with
+    _, clicks = _weights(rectified, nouns, scene, best)
+    only = (nouns[0], *(None for _ in nouns[1:]))
+    if not (_told(rectified, nouns, scene, best, clicks, nouns) and _told(rectified, nouns, scene, best, whiten, only)):
         return undetermined
     if any(_unlike(rectified, seen, best, other, wanted) for other in numbers[1:][chi2[1:] < chi2[0] + SECOND]):
         return undetermined
@@ -308,6 +308,27 @@ def _judged(
     off = rectified.off(best, seen.flat, seen.known)
     return replace(none, numbers=best, reason=Reason.OK, gain=gain, chi2=float(chi2[0]), freedom=freedom,
                    lone=_lone(whiten, jacobian, off))  # fmt: skip
+
+
+def _told(
+    rectified: Rectified,
+    nouns: Sequence[Noun | None],
+    scene: Numbers,
+    best: Array,
+    weights: Array,
+    doubtful: Sequence[Noun | None],
+) -> bool:
+    """Whether the conditions tell the plane's weakest number by more than what noise of the doubtful nouns alone would seem to tell."""
+    seen = scene(*nouns)
+    _, values, vectors = np.linalg.svd(weights @ rectified.slopes(best, seen.flat, seen.known))
+    weakest = vectors[-1]
+
+    def told(*moved: Noun | None) -> Array:
+        one = scene(*(new if new is not None else old for new, old in zip(moved, nouns, strict=True)))
+        return np.asarray(weights @ rectified.slopes(best, one.flat, one.known) @ weakest)
+
+    noise = float(np.trace(covariance_by(doubtful, told, len(weights))))
+    return bool(values[-1] ** 2 > max(LEVERAGE * noise, 1e-12))
 
 
 def _unlike(rectified: Rectified, seen: Scene, one: Array, other: Array, wanted: tuple[int, ...]) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from .arrays import Array, Bools
 from .camera import Camera
 from .errors import InputError
-from .flat_view import Disc, straight_view
+from .flat_view import MOST_POINTS, Disc, straight_view
 from .homography import covariance_by
 from .observation import Observation
 from .quantity import Note, Quantity
@@ -52,6 +52,8 @@ def check_lines(name: str, lines: Observation | None) -> None:
     count = lines.points_px.shape[-2]
     if count < 4 or count % 2:
         raise InputError(name, f"{count} points", "give two points of each line, and two lines or more")
+    if count > MOST_POINTS:
+        raise InputError(name, f"{count} points", f"give {MOST_POINTS // 2} lines at most; more tell nothing more")
 
 
 def view(camera: Camera | None, points: Observation, distortion: Quantity, disc: Disc) -> Array:

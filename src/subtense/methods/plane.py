@@ -18,8 +18,10 @@ import numpy as np
 from ..arrays import Array, Bools, Codes
 from ..camera import Camera
 from ..errors import InputError
+from ..flat_path import angle_between, crosses, enclosed_area, path_length
 from ..flat_view import (
     ASSUMED,
+    MOST_POINTS,
     Disc,
     FlatView,
     check_reference,
@@ -34,6 +36,9 @@ from ..method import Method, Output, Reason, reasons
 from ..observation import Observation
 from ..quantity import Note, Quantity
 from ..target import Target
+
+MOST_DRAWS = 100_000
+"""Each solves the plane anew."""
 
 
 def in_plane() -> Quantity:
@@ -67,8 +72,9 @@ class Inputs:
 
     def __post_init__(self) -> None:
         check_reference(self.points, self.target)
-        if self.path.points_px.shape[-2] < 2:
-            raise InputError("path", f"{self.path.points_px.shape[-2]} points", "give two or more")
+        count = self.path.points_px.shape[-2]
+        if not 2 <= count <= MOST_POINTS:
+            raise InputError("path", f"{count} points", f"give two or more, {MOST_POINTS} at most")
         if self.raised and self.camera is None and self.camera_height is None:
             raise InputError("off_plane", str(np.asarray(self.off_plane.value).tolist()),
                              "give the camera too, or its height over the plane with camera_height")  # fmt: skip
@@ -208,12 +214,6 @@ def _off_plane_factor(inputs: Inputs, begin: FlatView, seen: Array, lead: tuple[
         ), lost
 
 
-def _steps(places: Array, *, closed: bool = False) -> Array:
-    """(...) length along (..., M, 2) points."""
-    step = np.diff(places, axis=-2, append=places[..., :1, :]) if closed else np.diff(places, axis=-2)
-    return np.asarray(np.sqrt(np.sum(step**2, -1)).sum(axis=-1))
-
-
 def _with_extent(code: Codes, numbers: Array) -> Codes:
     """The reasons, with what has no extent among them."""
     empty = (code == 0) & ~(numbers > 0)
@@ -226,7 +226,7 @@ def plane(inputs: Inputs, begin: FlatView) -> Length:
     Source: the homography of the reference points; see the module.
     """
     places, code = _on_plane(inputs, begin)
-    length = _steps(places)
+    length = path_length(places)
     return Length(length, _with_extent(code, length))
 
 
@@ -236,11 +236,8 @@ def plane_area(inputs: Outline, begin: FlatView) -> Area:
     Source: the homography of the reference points, see the module; the shoelace formula.
     """
     places, code = _on_plane(inputs, begin)
-    x, y = places[..., 0], places[..., 1]
-    x, y = x - x[..., :1], y - y[..., :1]
-    area = abs(np.sum(x * np.roll(y, -1, -1) - np.roll(x, -1, -1) * y, -1)) / 2
-    outline = _steps(places, closed=True)
-    return Area(area, outline, _with_extent(code, outline))
+    outline = path_length(places, closed=True)
+    return Area(enclosed_area(places), outline, _with_extent(code, outline))
 
 
 def plane_angle(inputs: Corner, begin: FlatView) -> Angle:
@@ -250,9 +247,8 @@ def plane_angle(inputs: Corner, begin: FlatView) -> Angle:
     """
     places, code = _on_plane(inputs, begin)
     one, other = (places[..., i, :] - places[..., 1, :] for i in (0, 2))
-    cross = one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]
     shorter = np.minimum(np.sum(one**2, -1), np.sum(other**2, -1))
-    return Angle(np.arctan2(abs(cross), np.sum(one * other, -1)), _with_extent(code, shorter))
+    return Angle(angle_between(one, other), _with_extent(code, shorter))
 
 
 def notes(inputs: Inputs, result: Length | Area | Angle) -> tuple[Note, ...]:
@@ -262,7 +258,7 @@ def notes(inputs: Inputs, result: Length | Area | Angle) -> tuple[Note, ...]:
         found.append(Note("distortion_unknown", "nothing is known of the lens's distortion: "
                           f"{100 * float(inputs.distortion.u):.2g} % (1s) in the corners of the picture is in u",
                           "give a calibrated camera, or measure near the reference points and the middle of the picture"))  # fmt: skip
-    if isinstance(result, Area) and _crosses(inputs.path.points_px):
+    if isinstance(result, Area) and crosses(inputs.path.points_px):
         found.append(Note("outline_crosses", "the outline of the area crosses itself, and parts of it are subtracted from others",
                           "mark its corners in order around it"))  # fmt: skip
     if inputs.raised and not isinstance(result, Angle):
@@ -272,22 +268,6 @@ def notes(inputs: Inputs, result: Length | Area | Angle) -> tuple[Note, ...]:
                 f"{100 * (float(factor) - 1):+.2g} %")  # fmt: skip
         found.append(Note("off_plane", text, "lay the reference at the height of what is measured"))
     return tuple(found)
-
-
-def _crosses(points: Array) -> bool:
-    """Whether any two sides of a closed outline (M, 2) cross."""
-    ends = np.roll(points, -1, axis=0)
-    edge = ends - points
-
-    def side(i: int, p: Array) -> Array:
-        return np.asarray(edge[i, 0] * (p[..., 1] - points[i, 1]) - edge[i, 1] * (p[..., 0] - points[i, 0]))
-
-    n = len(points)
-    for i in range(n):
-        for j in range(i + 2, n - (i == 0)):
-            if side(i, points[j]) * side(i, ends[j]) < 0 and side(j, points[i]) * side(j, ends[i]) < 0:
-                return True
-    return False
 
 
 def _example(kind: type[Inputs], path: list[tuple[float, float]]) -> Inputs:
@@ -326,6 +306,7 @@ METHOD = Method(
     name="plane", title="a length or a path in a plane with four known points", inputs=Inputs,
     outputs=(Output("length_m", "length", "m", "length"),), function=plane, assumes=_ASSUMES, source=_SOURCE,
     typical="0.2 to 1 % near the reference, more away from it", example=example, button="Plane length", start=start, notes=notes,
+    most_draws=MOST_DRAWS,
 )  # fmt: skip
 
 AREA = Method(
@@ -333,10 +314,12 @@ AREA = Method(
     outputs=(Output("area_m2", "area", "m²", "area"), Output("outline_m", "length", "m", "length of the outline")),
     function=plane_area, assumes=_ASSUMES, source=_SOURCE, typical="0.5 to 2 % near the reference, more away from it",
     example=example_area, button="Plane area", start=start, notes=notes,
+    most_draws=MOST_DRAWS,
 )  # fmt: skip
 
 ANGLE = Method(
     name="plane_angle", title="an angle in a plane with four known points", inputs=Corner,
     outputs=(Output("angle_rad", "corner", "rad", "angle in the plane"),), function=plane_angle, assumes=_ASSUMES, source=_SOURCE,
     typical="0.2 to 1 degree", example=example_angle, button="Plane angle", start=start, notes=notes,
+    most_draws=MOST_DRAWS,
 )  # fmt: skip

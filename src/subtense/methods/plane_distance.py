@@ -185,4 +185,5 @@ METHOD = Method(
              "the picture is not cropped or edited after the camera's numbers were taken"),
     source="R. Hartley, A. Zisserman, Multiple View Geometry, 8.1.1", typical="0.3 to 2 %", example=example,
     button="Plane distance", prepare=prepare, start=start, place=place, notes=notes,
+    most_draws=100_000,
 )  # fmt: skip

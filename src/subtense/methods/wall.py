@@ -111,6 +111,7 @@ def wall(inputs: Inputs, begin: Lines) -> Result:
         length.shape, (perspective, Reason.NOT_PINHOLE), (missing, Reason.NOT_INVERTIBLE), (lost, Reason.NO_VANISHING_POINT),
         (np.asarray(~(np.asarray(inputs.height.value) > 0)), Reason.OUT_OF_RANGE), (np.asarray(~np.isfinite(over)), Reason.NO_HEIGHT),
         (np.asarray(~(over > 0)), Reason.UPSIDE_DOWN), (np.asarray(~np.all(down > 0, axis=-1)), Reason.BEYOND_HORIZON),
+        (np.asarray(~(np.sum(along**2, -1) > 0)), Reason.ZERO_EXTENT),
         (np.asarray(~np.all(distance > 0, axis=-1)), Reason.BEHIND_CAMERA), (np.asarray(~(length > 0)), Reason.ZERO_EXTENT),
     )  # fmt: skip
     return Result(length, width, rise, code)
