@@ -251,6 +251,7 @@ METHOD = Method(
     example=example,
     button="Stereo",
     prepare=prepare,
+    most_draws=100_000,
 )  # fmt: skip
 
 LENGTH = Method(
@@ -265,4 +266,5 @@ LENGTH = Method(
     example=example_length,
     button="Stereo length",
     prepare=prepare_length,
+    most_draws=100_000,
 )  # fmt: skip
