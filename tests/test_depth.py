@@ -559,6 +559,20 @@ def test_what_is_found_in_the_picture_anchors_the_map(desk, tmp_path, by):
     assert depths[0].u / depths[0].value > 0.008
 
 
+def test_a_person_who_is_found_and_taken_to_be_of_usual_height_anchors_and_says_so(examples, truth, tmp_path):
+    photo = Photo.load(examples / "street.jpg")
+    [person] = [thing for thing in truth["street.jpg"]["objects"] if thing["name"] == "person"]
+    depth = np.mean([point["depth_m"] for point in person["points"]])
+    numbers = 3.0 * np.where(np.indices((1200, 1800))[1] < 900, depth, 1.5 * depth)
+    said = DepthTexts(written(tmp_path / "map.npy", numbers), gives="scaled", error="2 %")
+    told = document(photo, said, points=["1200,600"], things=["person"], camera=None)
+    guessed = document(photo, said, points=["1200,600"], things=["objects"], camera=None)
+    for found in (told, guessed):
+        m = depth_of(found)
+        assert m.low < 1.5 * depth < m.high and m.u / m.value > 0.03
+    assert "assumed_size" in codes(guessed) and "assumed_size" not in codes(told)
+
+
 # -- the whole map, and the method -------------------------------------------------------------------
 
 
@@ -661,11 +675,12 @@ def test_a_depth_camera_s_map_places_points_where_the_next_frame_sees_them(share
     camera = "f=525px"
     said = DepthTexts(one, unit="1 mm", error="1 %")
     map_ = depth_map_of(anchored(first, said, camera=camera))
+    places = map_.points_m()
     grid = [(x, y) for x in range(80, 600, 60) for y in range(60, 440, 50)]
     inside = total = 0
     other = depth_map_of(anchored(second, DepthTexts(two, unit="1 mm", error="1 %"), camera=camera))
     for x, y in grid:
-        there = step[:3, :3] @ map_.points_m()[y, x] + step[:3, 3]
+        there = step[:3, :3] @ places[y, x] + step[:3, 3]
         if not np.isfinite(there).all():
             continue
         u, v = map_.camera.project(there[None])[0]

@@ -73,20 +73,20 @@ class Network:
     """
 
     def __init__(
-        self, path: str | Path, between: tuple[tuple[str, ...], tuple[str, ...]] | None = None, most_bytes: int = MOST_BYTES
+        self, path: str | Path, between: tuple[tuple[str, ...], tuple[str, ...]] | None = None, most_bytes: int | None = None
     ) -> None:  # fmt: skip
         """Look at the file; it is opened by an engine when something is asked of it.
 
         Args:
             path: the file.
             between: see the class.
-            most_bytes: larger files are refused.
+            most_bytes: larger files are refused; MOST_BYTES where None.
 
         Raises:
             FileFormatError: no such file, too large, or neither TFLite nor ONNX.
         """
         self.path, self.between = Path(path), between
-        self.kind = _kind(self.path, most_bytes)
+        self.kind = _kind(self.path, MOST_BYTES if most_bytes is None else most_bytes)
         self._kept = threading.local()
 
     @property

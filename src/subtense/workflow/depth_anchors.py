@@ -26,6 +26,7 @@ from .detect import detect, item_of
 from .found import Progress
 from .ground import GroundTexts, standing
 from .in_photo import Item, item_inputs
+from .measure import assumed
 from .measure_input import read_length
 from .resolve_camera import Resolved
 from .tables import DETECTORS
@@ -197,7 +198,9 @@ def _found(
                 )
             )
             continue
-        notes += [replace(note, text=f"{one.label}: {note.text}") for note in one.notes]
+        notes += [
+            replace(note, text=f"{one.label}: {note.text}") for note in (*assumed(one, search.targets), *one.notes)
+        ]
         nearer, u = _surface(one, item)
         measured.append(_Measured(item.method, item_inputs(item, photo, resolved), one.label, nearer, u))
     if not measured:
