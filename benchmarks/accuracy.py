@@ -21,6 +21,7 @@ import calibrations  # noqa: E402
 import circles  # noqa: E402
 import ground  # noqa: E402
 import markers  # noqa: E402
+import plane_conditions  # noqa: E402
 import planes  # noqa: E402
 import sheets  # noqa: E402
 import test_coverage as coverage  # noqa: E402
@@ -253,10 +254,20 @@ TABLES: dict[str, Callable[[], list[Row]]] = {
     "markers": markers.rows, "marker_bias": markers.bias_rows, "circles": circles.rows, "circles_rendered": circles.rendered,
     "sheets": sheets.rows, "sheets_rendered": sheets.rendered, "simulated": simulated, "planes": planes.simulated,
     "gross_clicks": planes.gross_clicks, "line_cameras": planes.cameras, "ground": ground.simulated, "together": together.rows,
+    "plane_conditions": plane_conditions.simulated, "plane_conditions_real": plane_conditions.pictures,
     "calibration_spread": calibration_spread, "calibration_faults": calibration_faults,
 }  # fmt: skip
 """What stands between its markers on the page, by their name."""
-REAL = ("frc2019", "focal", "april_vision", "calibration_real", "frc2024", "planes_real", "ground_real")
+REAL = (
+    "frc2019",
+    "focal",
+    "april_vision",
+    "calibration_real",
+    "frc2024",
+    "planes_real",
+    "ground_real",
+    "plane_conditions_real",
+)
 """Those of pictures outside the repository."""
 
 
