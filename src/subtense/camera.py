@@ -155,7 +155,7 @@ class Camera(Noun):
             (..., N, 3) in the camera frame; NaN rows where the distortion can't be inverted.
         """
         x, y, z = self._directions(np.asarray(points_px, float))
-        return np.stack([x, y, z], -1) / np.sqrt(x * x + y * y + z * z)[..., None]
+        return np.stack(np.broadcast_arrays(x, y, z), -1) / np.sqrt(x * x + y * y + z * z)[..., None]
 
     def slopes(self, points_px: Array) -> tuple[Array, Array]:
         """(..., N) x/z and y/z of viewing directions: where they pierce the plane at depth 1; NaN if they don't."""
@@ -167,6 +167,10 @@ class Camera(Noun):
         with np.errstate(divide="ignore", invalid="ignore"):
             z = np.where(z > 0, z, np.nan)
             return x / z, y / z
+
+    def normalised(self, points_px: Array) -> Array:
+        """(..., N, 2) the slopes of `slopes` as one array: normalised picture coordinates."""
+        return np.stack(np.broadcast_arrays(*self.slopes(points_px)), -1)
 
     def project(self, points_m: Array) -> Array:
         """Pixels of points in the camera frame.

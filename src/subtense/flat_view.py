@@ -66,7 +66,7 @@ class Disc:
 def straight_view(camera: Camera | None, points_px: Array, distortion: Quantity, disc: Disc) -> Array:
     """(..., N, 2) slopes with a camera, pixels without the distortion else."""
     if camera is not None:
-        return np.stack(np.broadcast_arrays(*camera.slopes(points_px)), -1)
+        return camera.normalised(points_px)
     share = np.asarray(distortion.value)[..., None, None]
     away = points_px - disc.middle_px
     return np.asarray(points_px + share * away * np.sum(away**2, -1, keepdims=True) / disc.radius_px**2)

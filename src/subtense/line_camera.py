@@ -167,7 +167,7 @@ def _rotation(scene: _Scene, theta: Array) -> Array | None:
     for axis in known:
         own = np.flatnonzero(scene.axes == axis)
         ends = np.stack([2 * own, 2 * own + 1], -1).reshape(-1)
-        seen = np.stack(camera.slopes(scene.points_px[ends]), -1)
+        seen = camera.normalised(scene.points_px[ends])
         v, lost = vanishing_point(seen, weights_of(seen, np.repeat(scene.sigma_px[own], 2)))
         if np.any(lost):
             return None

@@ -13,6 +13,7 @@ from .arrays import Array, Bools, Codes
 from .quantity import Note
 
 
+@enum.unique
 class Reason(enum.IntEnum):
     """Why a row has no answer; 0 where it has one. `FAR` reasons are approached by ever larger distances."""
 
@@ -89,8 +90,11 @@ _REASONS: dict[Reason, tuple[str, bool]] = {
         "the conditions do not fix the plane: more than one meets them; give one more, of another kind or direction",
         False,
     ),
-    Reason.NO_BASELINE: ("the first two pictures of the point were taken from one place, which tells no distance", False),
     Reason.PARALLEL_RAYS: ("the lines of sight do not meet in front of the cameras: they are parallel, or part", True),
+    Reason.NO_BASELINE: (
+        "the first two pictures of the point were taken from one place, which tells no distance",
+        False,
+    ),
 }
 
 Partials = tuple[Array, ...]

@@ -164,7 +164,7 @@ def _whitening(camera: Camera, seen: Observation, pose: Pose, points_m: Array, s
 def _closed_form(camera: Camera, seen: Observation, points_m: Array, factor: float) -> list[Pose]:
     import cv2
 
-    slopes = np.stack(camera.slopes(seen.points_px), -1) / factor
+    slopes = camera.normalised(seen.points_px) / factor
     if not np.all(np.isfinite(slopes)):
         return []
     poses = []

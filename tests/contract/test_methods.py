@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from subtense import propagate
+from subtense.camera import Camera
 from subtense.cli import main
 from subtense.noun import Noun
 from subtense.quantity import Quantity
@@ -100,3 +101,16 @@ def test_places_what_it_ranges(method):
     assert place.shape == (2, 3)
     assert np.linalg.norm(place, axis=-1) == pytest.approx(result.range_m, rel=1e-9)
     assert "depth_m" not in names or place[..., 2] == pytest.approx(result.depth_m, rel=1e-9)
+
+
+@pytest.mark.parametrize("only", range(4), ids=("f_px", "aspect", "cx_px", "cy_px"))
+def test_a_camera_with_one_doubtful_number(method, only):
+    inputs = method.example()
+    camera = getattr(inputs, "camera", None)
+    if not isinstance(camera, Camera):
+        return
+    cov = np.zeros((4 + camera.coefficients.size,) * 2)
+    cov[only, only] = 1e-8 if only == 1 else 1.0
+    inputs = dataclasses.replace(inputs, camera=dataclasses.replace(camera, cov=cov))
+    for m in propagate.measure(method, inputs, draws=2_000):
+        assert m.low <= m.value <= m.high

@@ -105,7 +105,7 @@ def plane_distance(inputs: Inputs, begin: FlatView) -> Result:
 
 def _numbers(begin: Pose, inputs: Inputs, view: FlatView) -> tuple[Array, Array, Array]:
     """Range, depth and the camera's height from one pose."""
-    seen = np.stack(inputs.camera.slopes(inputs.points.points_px), -1)
+    seen = inputs.camera.normalised(inputs.points.points_px)
     assert view.whiten is not None
     pose = refined_pose(begin, inputs.target.points_m, seen, view.whiten, 3)
     x, y = (slope[..., 0] for slope in inputs.camera.slopes(inputs.spot.points_px))

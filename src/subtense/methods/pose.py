@@ -117,7 +117,7 @@ class Start:
 @lru_cache(maxsize=8)
 def start(inputs: Inputs) -> Start:
     """Solve the nominal scene; no pose at all leaves `poses` empty."""
-    points, seen = inputs.target.points_m, _normalised(inputs.camera, inputs.points)
+    points, seen = inputs.target.points_m, inputs.camera.normalised(inputs.points.points_px)
     if not np.all(np.isfinite(seen)):
         return Start((), np.eye(seen.size), ())
     cov = _points_cov(inputs)
@@ -161,11 +161,6 @@ def _mirrored(pose: Pose, points_m: Array) -> Pose:
     return Pose(rotation, place - rotation @ middle)
 
 
-def _normalised(camera: Camera, points: Observation) -> Array:
-    """(..., N, 2) slopes of the viewing directions."""
-    return np.stack(camera.slopes(points.points_px), -1)
-
-
 def _points_cov(inputs: Inputs) -> Array:
     """(2N, 2N) covariance of the points, in normalised coordinates (pixels over f)."""
     f = float(np.mean(inputs.camera.f_px))
@@ -184,7 +179,7 @@ def _moved_cov(inputs: Inputs, at: Pose) -> Array:
     camera, target = inputs.camera, inputs.target
     cov = np.zeros((2 * inputs.points.points_px.shape[-2],) * 2)
     for part in camera.parts():
-        cov += _by_part(part, lambda values: _normalised(camera.moved(values), inputs.points))
+        cov += _by_part(part, lambda values: camera.moved(values).normalised(inputs.points.points_px))
     for part in target.parts():
         cov += _by_part(part, lambda values: _seen_at(at, target.moved(values).points_m))
     return cov
@@ -279,7 +274,7 @@ def pose(inputs: Inputs, begin: Start) -> Result:
     if not begin.poses:
         nothing = np.full(lead, np.nan)
         return Result(nothing, nothing, nothing, np.full(lead, Reason.NOT_CONVERGED, np.int8))
-    seen = _normalised(inputs.camera, inputs.points)
+    seen = inputs.camera.normalised(inputs.points.points_px)
     share = np.asarray(inputs.ambiguity.value)
     numbers = list(_numbers(begin.poses[0], inputs, seen, begin.whiten))
     if len(begin.poses) > 1 and (np.any(share) or np.any(inputs.ambiguity.u)):
@@ -302,7 +297,7 @@ def place(inputs: Inputs, begin: Start) -> Array:
     lead = _leading(inputs)
     if not begin.poses:
         return np.full((*lead, 3), np.nan)
-    seen = _normalised(inputs.camera, inputs.points)
+    seen = inputs.camera.normalised(inputs.points.points_px)
     share = np.asarray(inputs.ambiguity.value)[..., None]
     middle, _ = _middle(begin.poses[0], inputs, seen, begin.whiten)
     if len(begin.poses) > 1 and (np.any(share) or np.any(inputs.ambiguity.u)):
@@ -359,7 +354,7 @@ def notes(inputs: Inputs, result: Result) -> tuple[Note, ...]:
         cure = "check that the points are those of the target in its order, which side is which, and the camera"
         found.append(Note("points_misfit", text, cure))
     if begin.weight >= LEAST_WEIGHT and begin.apart_rad > TELLING_RAD:
-        other = _numbers(begin.poses[1], inputs, _normalised(inputs.camera, inputs.points), begin.whiten)
+        other = _numbers(begin.poses[1], inputs, inputs.camera.normalised(inputs.points.points_px), begin.whiten)
         text = (f"a second pose fits nearly as well (probability {begin.weight:.0%}): tilt {math.degrees(float(other[2])):.0f}° "
                 "the other way").replace("%)", " %)")  # fmt: skip
         found.append(Note("pose_ambiguous", text, "come closer, or look at the target from the side"))

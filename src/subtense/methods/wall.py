@@ -79,8 +79,7 @@ def wall(inputs: Inputs, begin: Lines) -> Result:
     Source: A. Criminisi, I. Reid, A. Zisserman, IJCV 40, 2000; see the module.
     """
     seen = {
-        n: np.stack(inputs.camera.slopes(getattr(inputs, n).points_px), -1)
-        for n in ("verticals", "reference", "foot", "ends")
+        n: inputs.camera.normalised(getattr(inputs, n).points_px) for n in ("verticals", "reference", "foot", "ends")
     }
     up, lost = vanishing_point(seen["verticals"], begin.verticals)
     b, t = seen["reference"][..., 0, :], seen["reference"][..., 1, :]
