@@ -151,9 +151,10 @@ def surveyed(kind, rng):
     """Points surveyed to 2 cm, in a picture of a camera of which little is known."""
     count, known = {"good": (14, 0.01), "bad": (8, 0.3)}[kind]
     pitch, roll = math.radians(rng.uniform(-22, -15)), math.radians(rng.normal(0, 2))
-    vector = np.array(
-        [1500.0 * (1 + known * rng.standard_normal()), 1.0, 799.5 + rng.normal(0, 5), 599.5 + rng.normal(0, 5)]
-    )
+    apart = rng.standard_normal()
+    while known * apart < -0.9:  # no focal length is below 0
+        apart = rng.standard_normal()
+    vector = np.array([1500.0 * (1 + known * apart), 1.0, 799.5 + rng.normal(0, 5), 599.5 + rng.normal(0, 5)])
     bend = rng.normal(0, 0.02)
     true = Camera(WIDTH, HEIGHT, vector[0], vector[2], vector[3], 1.0, "brown_conrady", np.array([bend, 0, 0, 0, 0]))
     cov = np.diag([(known * 1500) ** 2, 0, 25.0, 25.0, 0.02**2, 0, 0, 0, 0])
