@@ -78,6 +78,15 @@ def dense(left: Pixels, right: Pixels, low: int, high: int) -> Disparity:
     return _judged(left, right, there, _difference(there, back), low, low + count - 1)
 
 
+def agreed(left: Pixels, right: Pixels, low: int, high: int) -> Array:
+    """(n,) disparities that both directions of matching agree on, without their places; for a first look."""
+    count = max(16, -(-(high - low + 1) // 16) * 16)
+    there = _match(left, right, low, count)
+    back = _match(np.ascontiguousarray(right[:, ::-1]), np.ascontiguousarray(left[:, ::-1]), low, count)[:, ::-1]
+    kept = (_difference(there, back) <= MOST_DIFFERENCE_PX).astype(np.uint8)
+    return np.asarray(there[_opencv().erode(kept, np.ones((3, 3), np.uint8)) > 0])
+
+
 def of_map(left: Pixels, right: Pixels, px: Any, back: Any | None = None) -> Disparity:
     """The same for disparities that came from elsewhere, as from a network.
 
@@ -98,7 +107,8 @@ def _match(left: Pixels, right: Pixels, low: int, count: int) -> Any:
     Padded at the sides: OpenCV leaves out as many columns as it looks for disparities, though nearly all of them are seen twice.
     """
     cv2 = _opencv()
-    before, behind = max(low + count, 0), max(-low, 0)
+    # pixels nearer to the edge than the least disparity are seen once anyway
+    before, behind = max(low + count, 0) - max(low, 0), max(-low, 0)
     matcher = cv2.StereoSGBM_create(
         minDisparity=low, numDisparities=count, blockSize=BLOCK_PX, P1=8 * BLOCK_PX**2, P2=32 * BLOCK_PX**2,
         disp12MaxDiff=1 << 20, preFilterCap=31, uniquenessRatio=0, speckleWindowSize=0, mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
@@ -138,9 +148,12 @@ def _judged(left: Pixels, right: Pixels, px: Any, difference: Any, low: int, hig
         whole = np.where(seen, np.round(16 * px), 16 * (low - 1)).astype(np.int16)
         cv2.filterSpeckles(whole, 16 * (low - 1), SPECKLE_PX, round(16 * SPECKLE_STEP_PX))
         seen = whole != 16 * (low - 1)
-    step, hole = _step(px, seen), cv2.boxFilter(agreed.astype(np.float32), -1, (4 * REACH_PX + 1,) * 2) < 0.999
-    noise = _noise_px(left, right, px, seen)
-    sigma = np.sqrt(SUBPIXEL_PX**2 + noise**2 + np.where(seen, difference, 0) ** 2 / 2 + (step / 1.96) ** 2)
+    near = np.ones((4 * REACH_PX + 1,) * 2, np.uint8)
+    step, hole = _step(px, seen), cv2.erode(agreed.astype(np.uint8), near) == 0
+    noise2 = _noise2(left, right, px, seen)[: len(px)]
+    sigma = np.where(seen, difference, np.float32(0)) ** 2 / 2
+    sigma += noise2 + np.float32(SUBPIXEL_PX**2) + np.square(step / np.float32(1.96))
+    np.sqrt(sigma, out=sigma)
     unsure = float(UNSURE + UNSURE_BESIDE * np.mean(hole[seen])) if seen.any() else 1.0
     nothing = np.float32(np.nan)
     return Disparity(np.where(seen, px, nothing), np.where(seen, sigma, nothing).astype(np.float32),
@@ -150,8 +163,10 @@ def _judged(left: Pixels, right: Pixels, px: Any, difference: Any, low: int, hig
 def _step(px: Any, seen: Bools) -> Any:
     """(height, width) float32: how much the disparity within reach departs from the pixel's, beyond what a slanted surface does."""
     greatest, least = _extremes(px, seen, REACH_PX)
-    here = np.where(seen, px, 0)
-    return np.where(seen, np.maximum(np.maximum(greatest - here, here - least) - SLANT * REACH_PX, 0), 0)
+    here = np.where(seen, px, np.float32(0))
+    return np.where(
+        seen, np.maximum(np.maximum(greatest - here, here - least) - np.float32(SLANT * REACH_PX), 0), np.float32(0)
+    )
 
 
 def _extremes(px: Any, seen: Bools, reach: int) -> tuple[Any, Any]:
@@ -163,24 +178,26 @@ def _extremes(px: Any, seen: Bools, reach: int) -> tuple[Any, Any]:
     return greatest, cv2.erode(np.where(seen, px, np.float32(-NOWHERE)), square)
 
 
-def _noise_px(left: Pixels, right: Pixels, px: Any, seen: Bools) -> Any:
-    """(height, width) float32: noise over gradient. The noise is what the pictures differ by where they are matched.
+def _noise2(left: Pixels, right: Pixels, px: Any, seen: Bools) -> Any:
+    """(height, width) float32: square of noise over gradient, px. The noise is what the pictures differ by where they are matched.
 
     sigma_d = sigma_difference / sqrt(sum of squared gradients along the row), over the window that the costs are gathered in.
     """
     import cv2
 
-    height, width = px.shape
-    x = np.arange(width, dtype=np.float32) - np.where(seen, px, 0)
-    rows = np.broadcast_to(np.arange(height, dtype=np.float32)[:, None], px.shape)
+    # every second row: windows are wider than that, and gradients along rows stay whole
+    left, right, px, seen = left[::2], right[::2], px[::2], seen[::2]
+    x = np.arange(px.shape[1], dtype=np.float32) - np.where(seen, px, np.float32(0))
+    rows = np.broadcast_to(np.arange(px.shape[0], dtype=np.float32)[:, None], px.shape)
     theirs = cv2.remap(right, x, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    window = (2 * REACH_PX + 1,) * 2
+    window = (2 * REACH_PX + 1, REACH_PX + 1)
     apart = cv2.subtract(left, theirs, dtype=cv2.CV_32F)
     mean = cv2.boxFilter(apart, -1, window)
-    spread = np.maximum(cv2.sqrBoxFilter(apart, cv2.CV_32F, window) - mean * mean, LEAST_NOISE**2)
-    slope = cv2.Sobel(left, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8)
-    energy = cv2.sqrBoxFilter(slope, cv2.CV_32F, window, normalize=False)
-    return np.sqrt(spread / np.maximum(energy, 1e-3))
+    spread = np.maximum(cv2.sqrBoxFilter(apart, cv2.CV_32F, window) - mean * mean, np.float32(LEAST_NOISE**2))
+    slope = cv2.subtract(left[:, 2:], left[:, :-2], dtype=cv2.CV_32F)
+    energy = cv2.sqrBoxFilter(cv2.copyMakeBorder(slope, 0, 0, 1, 1, cv2.BORDER_REPLICATE), cv2.CV_32F, window)
+    count = np.float32((2 * REACH_PX + 1) ** 2 / 4)  # pixels of the whole window; slopes are over two pixels
+    return np.repeat(spread / np.maximum(count * energy, np.float32(1e-3)), 2, axis=0)
 
 
 # -- filling ---------------------------------------------------------------------------------------------

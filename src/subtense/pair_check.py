@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 
 from .arrays import Array, Pixels
-from .disparity import dense
+from .disparity import agreed
 from .errors import GeometryError
 from .quantity import Note
 
 LEAST_CONTRAST = 2.0
 """Standard deviation of gray levels below which a picture shows nothing."""
+ORB_PX = 640
+"""Longer side of the pictures in which the first kind of features is looked for."""
 ENOUGH = 30
 """Matches with which the first kind of features is enough."""
 LEAST = 12
@@ -29,7 +31,7 @@ ROW_TOLERANCE_PX = 0.75
 """By which rows may differ without harm."""
 ROW_LIMIT_PX = 3.0
 """Beyond it matching along rows finds something else."""
-SMALL_PX = 320
+SMALL_PX = 200
 """Width at which the range of disparities is looked for."""
 MOST_DISPARITIES = 1024
 NO_COMMON = 0.12
@@ -99,7 +101,7 @@ def matched_features(left: Pixels, right: Pixels) -> tuple[Array, Array]:
     import cv2 as opencv
 
     cv2: Any = opencv
-    first, second = _matched(cv2.ORB_create(1000), cv2.NORM_HAMMING, left, right, _scale(left, 1000))
+    first, second = _matched(cv2.ORB_create(500), cv2.NORM_HAMMING, left, right, _scale(left, ORB_PX))
     if len(first) < ENOUGH:
         more = _matched(cv2.SIFT_create(1000), cv2.NORM_L2, left, right, _scale(left, 800))
         first, second = more if len(more[0]) > len(first) else (first, second)
@@ -130,7 +132,8 @@ def _matched(finder: Any, norm: int, left: Pixels, right: Pixels, scale: float) 
 def _check_rows(left: Pixels, first: Array, second: Array) -> tuple[float, tuple[Note, ...]]:
     """The median difference of rows, and what it says of the rig."""
     if len(first) < LEAST:
-        return math.nan, ()
+        text = f"only {len(first)} features are clearly the same in both pictures; whether the rig fits them could not be checked"
+        return math.nan, (Note("rows_unchecked", text, "check the rig by a picture with more texture"),)
     rows = second[:, 1] - first[:, 1]
     middle = float(np.median(rows))
     near = rows[abs(rows - middle) < 2.5]
@@ -142,7 +145,7 @@ def _check_rows(left: Pixels, first: Array, second: Array) -> tuple[float, tuple
         raise _not_rectified(
             f"the right picture shows the same things {abs(middle):.1f} px {'lower' if middle > 0 else 'higher'}"
         )
-    tolerance = max(ROW_TOLERANCE_PX, 0.35 / _scale(left, 1000))
+    tolerance = max(ROW_TOLERANCE_PX, 0.35 / _scale(left, ORB_PX))
     if abs(middle) > tolerance or off > 2 * tolerance:
         text = (f"rows of the two pictures differ by {middle:.1f} px in the middle of {len(rows)} matches; the rig fits the pictures "
                 "badly, and disparities may be off by as much")  # fmt: skip
@@ -154,7 +157,7 @@ def _unlike(left: Pixels, first: Array, second: Array, rows: Array) -> tuple[flo
     """Rows differ without order: pictures of one scene that are not rectified, or of different ones."""
     import cv2
 
-    _, same = cv2.findFundamentalMat(first, second, cv2.FM_RANSAC, 1.5 / _scale(left, 1000), 0.99)
+    _, same = cv2.findFundamentalMat(first, second, cv2.FM_RANSAC, 1.5 / _scale(left, ORB_PX), 0.99)
     share = 0.0 if same is None else float(np.mean(same))
     if share >= 0.5 and share * len(first) >= 2 * LEAST:
         apart = float(np.median(abs(rows[np.ravel(same).astype(bool)])))
@@ -189,10 +192,9 @@ def _range(left: Pixels, right: Pixels, apart: Array, doffs_px: float) -> tuple[
     scale = min(1.0, SMALL_PX / left.shape[1])
     small = [cv2.resize(one, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for one in (left, right)]
     least = math.floor(-doffs_px * scale) - 2
-    found = dense(small[0], small[1], least, least + max(16, min(round(0.6 * small[0].shape[1]), 256)))
-    seen = found.px[~np.isnan(found.px)] / scale
+    seen = agreed(small[0], small[1], least, least + round(0.5 * small[0].shape[1])) / scale
     # a pair in common shows most of one picture in the other; chance agrees here and there
-    if len(seen) < NO_COMMON * found.px.size and len(apart) < LEAST:
+    if len(seen) < NO_COMMON * small[0].size and len(apart) < LEAST:
         raise GeometryError(
             "the two pictures have nothing in common that could be matched; give two pictures of one scene, taken side by side",
             code="no_overlap",
