@@ -17,6 +17,7 @@ import monte_carlo
 import pictures
 import rows
 import startup
+import stereo
 from comparison import Comparison, table
 
 HERE = Path(__file__).parent
@@ -30,6 +31,7 @@ ALL = {
     "pictures": pictures,
     "calibration": calibration,
     "marker_speed": marker_speed,
+    "stereo": stereo,
 }
 
 

@@ -21,6 +21,8 @@ from .space import Space
 
 LEAST_U = 3.0
 """Disparities of fewer u beyond infinity have no depth."""
+FARTHEST = 1.0
+"""Parallax in px that a filled pixel has at least."""
 ACROSS, DOWN = 9, 7
 """Places at which the rig's doubt is had."""
 PARALLAXES_PX = (5.0, 50.0)
@@ -46,7 +48,8 @@ def depth_map(found: Disparity, pair: Rectified, located: Located, source: str) 
         sigma2 = (
             np.square(found.sigma_px * np.float32(scale)) + shift + 2 * both * inverse + stretch * inverse * inverse
         )
-        resolved = inverse >= LEAST_U * np.sqrt(sigma2)
+        # filled ones keep their place: what is far from sure there is said by their sigma
+        resolved = (inverse >= LEAST_U * np.sqrt(sigma2)) | (found.filled & (inverse > FARTHEST * scale))
         depth = np.where(resolved, lean / inverse, np.nan)
         sigma = np.where(resolved, np.sqrt(sigma2) * depth / inverse, np.nan)
     filled = found.filled & resolved
