@@ -135,6 +135,7 @@ def test_points_are_found_in_other_pictures(scene, photos):
     found = measurements(done, photos, [texts[0], f"{texts[0]} -> {texts[1]}", f"2.png -> {texts[0]}"]).measurements
     reach = found[0]
     assert len(reach.given["point"]["names"]) >= 3
+    assert [note.code for note in reach.notes] == ["point_found"] and "3.png:" in reach.notes[0].text
     assert reach.low < np.linalg.norm(corners[0] - CENTRE[1]) < reach.high
     length, from_camera = found[2], found[3]
     assert length.low < np.linalg.norm(corners[1] - corners[0]) < length.high and length.u < 0.005

@@ -12,12 +12,19 @@ from ..arrays import Array
 from ..errors import NothingFoundError
 from ..observation import Observation
 from ..photo import Photo
+from ..quantity import Note
 from ..scene import Scene
 from ..views import Track
 
 PATCH = 10
 """Pixels to each side of the point that are compared."""
-DEPTHS = 64
+SMALL_PATCH = 4
+STEP_PX = 0.7
+MOST_DEPTHS = 300
+AGREE_PX = 1.5
+"""How far apart the two sizes of patch may find a point before it is in doubt, to a pixel."""
+REFINED_AGREE_PX = 1.0
+"""The same, to a part of a pixel."""
 NEIGHBOURS = 12
 LEAST_LIKENESS = 0.75
 """Normalised correlation below which a picture does not show the point."""
@@ -33,6 +40,7 @@ class Finder:
 
     def __init__(self, scene: Scene, photos: Mapping[str, Path]) -> None:
         self.scene, self.photos = scene, photos
+        self.notes: list[Note] = []
 
     def found(self, track: Track) -> Track:
         """The track with the point in further pictures.
@@ -53,6 +61,10 @@ class Finder:
         if len(names) < 2:
             raise NothingFoundError(f"{name}:{seen[0]:g},{seen[1]:g} is found in no other picture beyond doubt; set it in a second one: "
                                     "'a.jpg:120,80; b.jpg:95,82'", found=1, needed=2)  # fmt: skip
+        places = "; ".join(f"{n}:{p[0]:.1f},{p[1]:.1f}" for n, p in zip(names[1:], points[1:], strict=True))
+        text = (f"{track.seen.label} was found in other pictures by its looks ({places}); at the edge of a thing that may be what lies "
+                "behind it")  # fmt: skip
+        self.notes.append(Note("point_found", text, "look there, or set it in a second picture"))
         return Track(tuple(names), self._observation(track, np.array(points), slopes))
 
     def _observation(self, track: Track, points: Array, slopes: list[Array]) -> Observation:
@@ -86,18 +98,36 @@ class Finder:
         return [int(j) for j in np.argsort(-shared)[:MOST_PICTURES] if shared[j] >= 5]
 
     def _match(self, i: int, seen: Array, j: int, depth: float, spread: float) -> tuple[Array, Array] | None:
-        """Where another picture shows it, and how that place moves with the point; None if not beyond doubt."""
-        inverse = np.linspace(1 / (depth + spread), 1 / max(depth - 0.7 * spread, 0.2 * depth), DEPTHS)
-        scores = np.array([self._likeness(i, seen, j, 1 / w) for w in inverse])
+        """Where another picture shows it, and how that place moves with the point; None if not beyond doubt.
+
+        Two sizes of patch must agree: at the edge of a thing the larger one shows what is behind it, and the smaller one the thing.
+        """
+        ends = np.array([0.5 / (depth + spread), 2 / max(depth - 0.7 * spread, 0.2 * depth)])
+        apart = float(
+            np.linalg.norm(self._at(i, seen[None], j, 1 / ends[0])[0] - self._at(i, seen[None], j, 1 / ends[1])[0])
+        )
+        if not np.isfinite(apart):
+            return None
+        inverse = np.linspace(*ends, int(np.clip(apart / STEP_PX, 16, MOST_DEPTHS)))
+        places = np.array([self._at(i, seen[None], j, 1 / w)[0] for w in inverse])
+        best = [self._best(i, seen, j, inverse, places, half) for half in (PATCH, SMALL_PATCH)]
+        if best[0] is None or best[1] is None or np.linalg.norm(places[best[0]] - places[best[1]]) > AGREE_PX:
+            return None
+        found = [self._refined(i, seen, j, 1 / inverse[best[0]], half) for half in (PATCH, SMALL_PATCH)]
+        if found[0] is None or found[1] is None or np.linalg.norm(found[0][0] - found[1][0]) > REFINED_AGREE_PX:
+            return None
+        return found[0]
+
+    def _best(self, i: int, seen: Array, j: int, inverse: Array, places: Array, half: int) -> int | None:
+        """Which inverse depth looks most alike, if nothing apart from it looks nearly so; a small patch need not be unique."""
+        scores = np.array([self._likeness(i, seen, j, 1 / w, half) for w in inverse])
         if not np.any(np.isfinite(scores)):
             return None
         best = int(np.nanargmax(scores))
-        places = np.array([self._at(i, seen[None], j, 1 / w)[0] for w in inverse])
         apart = np.linalg.norm(places - places[best], axis=1) > 3.0
-        rival = float(np.nanmax(np.where(apart, scores, -1.0)))
-        if scores[best] < LEAST_LIKENESS or scores[best] - rival < UNIQUE:
-            return None
-        return self._refined(i, seen, j, 1 / inverse[best])
+        rival = float(np.max(np.nan_to_num(np.where(apart, scores, -1.0), nan=-1.0)))
+        unique = UNIQUE if half == PATCH else 0.0
+        return best if scores[best] >= LEAST_LIKENESS and scores[best] - rival >= unique else None
 
     def _at(self, i: int, points_px: Array, j: int, depth: float) -> Array:
         """(N, 2) where picture j shows pixels of picture i, were they at a depth."""
@@ -110,20 +140,20 @@ class Finder:
         ends = self._at(i, seen + np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1.0]]), j, depth)
         return ends[0], np.stack([(ends[1] - ends[2]) / 2, (ends[3] - ends[4]) / 2], -1)
 
-    def _likeness(self, i: int, seen: Array, j: int, depth: float) -> float:
+    def _likeness(self, i: int, seen: Array, j: int, depth: float, half: int) -> float:
         place, slope = self._slope(i, seen, j, depth)
-        return _correlation(self._patch(i, seen, np.eye(2)), self._patch(j, place, slope))
+        return _correlation(self._patch(i, seen, np.eye(2), half), self._patch(j, place, slope, half))
 
-    def _refined(self, i: int, seen: Array, j: int, depth: float) -> tuple[Array, Array] | None:
+    def _refined(self, i: int, seen: Array, j: int, depth: float, half: int) -> tuple[Array, Array] | None:
         """To a part of a pixel, by Gauss-Newton steps on the difference of the patches, gain and offset free."""
         place, slope = self._slope(i, seen, j, depth)
-        want = self._patch(i, seen, np.eye(2))
+        want = self._patch(i, seen, np.eye(2), half)
         start = place
         for _ in range(15):
-            here = self._patch(j, place, slope)
+            here = self._patch(j, place, slope, half)
             if here is None or want is None:
                 return None
-            dx, dy = (self._patch(j, place + step, slope) for step in (np.array([0.5, 0]), np.array([0, 0.5])))
+            dx, dy = (self._patch(j, place + step, slope, half) for step in (np.array([0.5, 0]), np.array([0, 0.5])))
             if dx is None or dy is None:
                 return None
             a = np.stack([2 * (dx - here), 2 * (dy - here), here, np.ones_like(here)], -1).reshape(-1, 4)
@@ -133,15 +163,15 @@ class Finder:
             place = place + np.clip(step, -1, 1)
             if np.linalg.norm(step) < 0.01:
                 break
-        likeness = _correlation(want, self._patch(j, place, slope))
+        likeness = _correlation(want, self._patch(j, place, slope, half))
         return (place, slope) if likeness >= LEAST_LIKENESS and np.linalg.norm(place - start) < 4 else None
 
-    def _patch(self, i: int, place: Array, slope: Array) -> Array | None:
-        """(2 PATCH + 1, 2 PATCH + 1) gray values around a place, on a grid that `slope` deforms; None at the picture's edge."""
+    def _patch(self, i: int, place: Array, slope: Array, half: int) -> Array | None:
+        """(2 half + 1, 2 half + 1) gray values around a place, on a grid that `slope` deforms; None at the picture's edge."""
         import cv2
 
         gray = _gray(self.photos[self.scene.names[i]])
-        grid = np.arange(-PATCH, PATCH + 1, dtype=float)
+        grid = np.arange(-half, half + 1, dtype=float)
         offset = np.stack(np.meshgrid(grid, grid), -1) @ slope.T + place
         if (
             not np.all(np.isfinite(offset))

@@ -87,6 +87,7 @@ def metric(scene: Scene, photos: Mapping[str, Path], asked: Asked) -> Scaled:
     if asked.marker_size is not None or asked.targets:
         known += known_things(scene, views, photos, asked)
     known += known_lengths(asked.checks, views, finder.found, check=True)
+    doubts = (*doubts, *finder.notes)
     done = scaled(replace(scene, notes=(*scene.notes, *doubts)), known)
     done = replace(done, notes=(*doubts, *done.notes))
     return done if placed is None else replace(done, scene=on_positions(done.scene, placed, frame))
@@ -184,15 +185,18 @@ def measurements(
     refused: list[Note] = []
     for number, text in enumerate(texts, 1):
         try:
+            finder.notes.clear()
             tracks, label = measured_ends(text, views, number, finder.found)
+            doubts = tuple(finder.notes)
             part = views.subset([name for track in tracks for name in track.names])
             if len(tracks) == 1:
                 inputs: object = triangulation.Inputs(part, tracks[0])
-                found += measured(triangulation.METHOD, inputs, label, level, seed)[:2]
+                answers = measured(triangulation.METHOD, inputs, label, level, seed)[:2]
             else:
-                found += measured(
+                answers = measured(
                     triangulation.LENGTH, triangulation.LengthInputs(part, tracks[0], tracks[1]), label, level, seed
                 )
+            found += [replace(answers[0], notes=(*answers[0].notes, *doubts)), *answers[1:]]
         except SubtenseError as error:
             if len(texts) == 1 or isinstance(error, InputError):
                 raise
