@@ -15,6 +15,7 @@ from onnx_files import constants
 from PIL import Image
 
 from subtense import propagate
+from subtense.anchoring import Anchor, aligned
 from subtense.camera import Camera
 from subtense.cli import main
 from subtense.depth_models import depth_models, find_depth_model, u_of_share
@@ -23,6 +24,7 @@ from subtense.methods import depth_map
 from subtense.observation import Observation
 from subtense.photo import Photo
 from subtense.quantity import Quantity
+from subtense.raw_depth import RawDepth
 from subtense.workflow.depth import Wanted, anchored, depth_document, depth_map_of
 from subtense.workflow.depth_source import DepthTexts
 from subtense.workflow.ground import GroundTexts
@@ -493,6 +495,28 @@ def test_an_anchor_that_lies_far_off_is_named_and_does_not_carry_the_map_away(pi
     assert "anchors_disagree" in codes(wrong) and "4.1 m" in str([n.text for n in wrong.notes])
     m = depth_of(wrong)
     assert m.low < 2.6 < m.high and m.u > 2 * right.u
+
+
+def test_no_anchor_however_wild_ends_in_anything_but_an_alignment_or_one_line():
+    rng, answered = np.random.default_rng(0), 0
+    for _ in range(150):
+        kind = rng.choice(["metric", "scaled", "affine", "disparity"])
+        raw = RawDepth(
+            np.ones((2, 2)), kind, "map", 0.3, float(10 ** rng.uniform(-6, 0)), float(rng.choice([0, 1e-3, 1]))
+        )
+        given = [
+            Anchor(
+                np.zeros(2), *(float(10**e) for e in rng.uniform(-6, 6, 3)), float(rng.choice([0.0, 0.01])), "anchor"
+            )
+            for _ in range(rng.integers(1, 6))
+        ]
+        try:
+            found = aligned(raw, given)
+        except InputError:
+            continue
+        answered += 1
+        assert found.scale > 0 and np.isfinite([found.u_scale, found.u_offset, found.offset, found.u_local]).all()
+    assert answered > 50
 
 
 def test_a_map_of_metres_that_anchors_make_three_times_as_long_is_doubted(picture, tmp_path):

@@ -115,8 +115,12 @@ def aligned(raw: RawDepth, anchors: Sequence[Anchor], cov_m2: Array | None = Non
     known = known * np.outer(slope, slope)
     prior = None if open_shift else raw.u_local * float(np.exp(np.mean(np.log(x))))
     fit = _Fit(v, x, known, np.array([a.spread for a in anchors]), raw, slope, prior)
-    tau, weights = fit.settled()
-    theta, _ = fit.solved(tau, weights)
+    try:
+        tau, weights = fit.settled()
+        theta, _ = fit.solved(tau, weights)
+    except np.linalg.LinAlgError:
+        text = "; ".join(a.label for a in anchors)
+        raise InputError("--anchor", text, "they do not determine the map; give others at different depths") from None
     if not theta[1] > 0:
         raise _turned_round(raw, anchors)
     count = len(anchors)
@@ -251,6 +255,8 @@ class _Fit:
         low, high = math.log(start / 20), math.log(max(start * 1000, 10.0))
         if excess(low) <= 0:  # of thousands of anchors, all of which fit
             return math.exp(low)
+        if excess(high) >= 0:  # anchors that nothing brings together
+            return math.exp(high)
         return math.exp(float(brentq(excess, low, high, xtol=1e-3)))
 
 
