@@ -108,7 +108,7 @@ class Finder:
         )
         if not np.isfinite(apart):
             return None
-        inverse = np.linspace(*ends, int(np.clip(apart / STEP_PX, 16, MOST_DEPTHS)))
+        inverse = np.linspace(float(ends[0]), float(ends[1]), int(np.clip(apart / STEP_PX, 16, MOST_DEPTHS)))
         places = np.array([self._at(i, seen[None], j, 1 / w)[0] for w in inverse])
         best = [self._best(i, seen, j, inverse, places, half) for half in (PATCH, SMALL_PATCH)]
         if best[0] is None or best[1] is None or np.linalg.norm(places[best[0]] - places[best[1]]) > AGREE_PX:
