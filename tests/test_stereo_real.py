@@ -78,6 +78,9 @@ def test_rows_of_a_chessboard_are_as_long_as_they_are(shared_data):
     numbers = [1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 12, 13, 14]
     files = [[folder / f"{side}{n:02d}.jpg" for n in numbers] for side in ("left", "right")]
     rig = calibrate_rig(*files, board_of("chessboard", "10x7", "25 mm", None, None, legacy=False)).rig
+    assert (
+        np.sqrt(np.diag(rig.cov)[-6:-3]).max() < 0.005
+    )  # the turn between the cameras, rad; not what a lens model's own axis turns by
     inside, off = [], []
     for pair in zip(*files, strict=True):
         left, right = (_corners(path) for path in pair)
