@@ -23,6 +23,7 @@ import ground  # noqa: E402
 import markers  # noqa: E402
 import plane_conditions  # noqa: E402
 import planes  # noqa: E402
+import scenes  # noqa: E402
 import sheets  # noqa: E402
 import stereo_accuracy  # noqa: E402
 import test_coverage as coverage  # noqa: E402
@@ -257,6 +258,7 @@ TABLES: dict[str, Callable[[], list[Row]]] = {
     "gross_clicks": planes.gross_clicks, "line_cameras": planes.cameras, "ground": ground.simulated, "together": together.rows,
     "plane_conditions": plane_conditions.simulated, "plane_conditions_real": plane_conditions.pictures,
     "calibration_spread": calibration_spread, "calibration_faults": calibration_faults,
+    "scenes_real": scenes.pictures, "scenes_rendered": scenes.rendered,
     "stereo": stereo_accuracy.depths, "stereo_rows": stereo_accuracy.chess,
 }  # fmt: skip
 """What stands between its markers on the page, by their name."""
@@ -269,6 +271,7 @@ REAL = (
     "planes_real",
     "ground_real",
     "plane_conditions_real",
+    "scenes_real",
     "stereo",
     "stereo_rows",
 )

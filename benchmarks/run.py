@@ -15,6 +15,7 @@ import calibration
 import marker_speed
 import monte_carlo
 import pictures
+import reconstruction
 import rows
 import startup
 import stereo
@@ -31,6 +32,7 @@ ALL = {
     "pictures": pictures,
     "calibration": calibration,
     "marker_speed": marker_speed,
+    "reconstruction": reconstruction,
     "stereo": stereo,
 }
 

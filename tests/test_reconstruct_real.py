@@ -17,7 +17,7 @@ pytest.importorskip("pycolmap")
 pytestmark = pytest.mark.opencv
 
 TRUTH_M = 0.002
-"""Per coordinate, of the fountain's places of cameras: registered to a laser scan, and programs of all makes differ from them by 2 to 3 mm."""
+"""Per coordinate of the fountain's truth: registered to a laser scan; programs of all makes differ from it by 2 to 3 mm."""
 
 
 def scene_of(paths, camera, features):
