@@ -195,14 +195,20 @@ def _range(left: Pixels, right: Pixels, apart: Array, doffs_px: float) -> tuple[
     seen = agreed(small[0], small[1], least, least + round(0.5 * small[0].shape[1])) / scale
     # a pair in common shows most of one picture in the other; chance agrees here and there
     if len(seen) < NO_COMMON * small[0].size and len(apart) < LEAST:
-        raise GeometryError(
-            "the two pictures have nothing in common that could be matched; give two pictures of one scene, taken side by side",
-            code="no_overlap",
-        )
+        raise _nothing_in_common()
     ends = [np.quantile(seen, [0.002, 0.998])] if len(seen) > 100 else []
     ends += [np.quantile(apart, [0.01, 0.99])] if len(apart) >= LEAST else []
+    if not ends:
+        raise _nothing_in_common()
     low, high = min(e[0] for e in ends), max(e[1] for e in ends)
     room = 2 / scale + 0.05 * (high - low)
     low = max(low - room, -doffs_px - 2)
     high = min(max(high + room, low + 16), low + MOST_DISPARITIES, left.shape[1] - 1)
     return math.floor(low), math.ceil(high)
+
+
+def _nothing_in_common() -> GeometryError:
+    return GeometryError(
+        "the two pictures have nothing in common that could be matched; give two pictures of one scene, taken side by side",
+        code="no_overlap",
+    )

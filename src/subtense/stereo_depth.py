@@ -44,7 +44,7 @@ def depth_map(found: Disparity, pair: Rectified, located: Located, source: str) 
     inverse = (found.px + np.float32(pair.doffs_px)) * np.float32(scale)
     shift, both, stretch = (np.asarray(one) for one in _rig_variance(pair, located))
     lean = _lean(pair)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         sigma2 = (
             np.square(found.sigma_px * np.float32(scale)) + shift + 2 * both * inverse + stretch * inverse * inverse
         )

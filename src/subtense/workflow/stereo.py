@@ -19,7 +19,7 @@ from ..document import Document, Shape
 from ..errors import FileFormatError, InputError
 from ..methods import stereo as method
 from ..observation import Observation
-from ..pair_check import PairFacts, check_pair
+from ..pair_check import MOST_DISPARITIES, PairFacts, check_pair
 from ..photo import Photo
 from ..quantity import Measurement, Note, Quantity
 from ..rectified_pair import Rectified, rectified, smooth_map
@@ -33,6 +33,8 @@ from .stereo_point import BoxMatch, SpotMatch, box_match, spot_match
 
 MOST_WORK = 1_500_000_000
 """Pixels times disparities; larger pairs are matched densely at a smaller size."""
+LEAST_SIDE_PX = 16
+"""Smaller pictures have no window to match."""
 SAME_SHAPE = 0.01
 """Relative difference of proportions up to which a rig is for pictures of another size."""
 
@@ -110,7 +112,7 @@ def match_pair(left: Photo, right: Photo, asked: Asked) -> Matched:
     one, two = pair.pair(*grays)
     facts = check_pair(one, two, pair.doffs_px)
     if asked.disparities:
-        low, high = _limits(asked.disparities)
+        low, high = _limits(asked.disparities, one.shape[1])
         facts = dataclasses.replace(facts, low_px=low, high_px=high)
     disparity, notes = _disparity(left, right, pair, (one, two), facts, asked)
     notes = (*left.notes, *found.notes, *facts.notes, *notes, *_shutter(asked.shutter))
@@ -165,6 +167,10 @@ def rig_for(left: Photo, right: Photo, asked: Asked) -> RigFound:
             "RIGHT",
             f"{right.width_px} x {right.height_px} px",
             f"LEFT has {size[0]} x {size[1]}; give a pair of one size",
+        )
+    if min(size) < LEAST_SIDE_PX:
+        raise InputError(
+            "LEFT", f"{size[0]} x {size[1]} px", f"give pictures of {LEAST_SIDE_PX} px or more on each side"
         )
     for photo in (left, right):
         if photo.metadata.orientation != 1:
@@ -229,14 +235,15 @@ def _gray(photo: Photo) -> Pixels:
     return np.asarray(cv2.cvtColor(photo.pixels, cv2.COLOR_RGB2GRAY))
 
 
-def _limits(text: str) -> tuple[int, int]:
+def _limits(text: str, width: int) -> tuple[int, int]:
     words = text.split(":")
     try:
         low, high = (int(word) for word in words)
     except ValueError:
         low, high = 0, 0
-    if not -4096 <= low < high <= 8192:
-        raise InputError("--disparities", text, "write the least and the greatest in whole pixels, as 0:128")
+    if not -width < low < high < width or high - low > MOST_DISPARITIES:
+        allowed = f"write the least and the greatest in whole pixels, as 0:128, at most {MOST_DISPARITIES} apart and within the width"
+        raise InputError("--disparities", text, allowed)
     return low, high
 
 
