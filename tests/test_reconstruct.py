@@ -21,6 +21,7 @@ from subtense.views import Views
 from subtense.workflow.reconstruct import opened_scene, pictures_in, reconstructed
 from subtense.workflow.reconstruct_input import read_positions
 from subtense.workflow.reconstruct_measure import Asked, measurements, metric
+from subtense.workflow.reconstruct_rig import read_pairs, rig_of, write_pairs
 
 pytest.importorskip("pycolmap")
 pytestmark = pytest.mark.opencv
@@ -376,6 +377,39 @@ def test_pairs_of_a_rig(scene, photos):
     assert [one.label for one in done.said] == ["baseline of left0", "baseline of left1"]
     with pytest.raises(InputError, match="--baseline"):
         metric(scene, photos, Asked(baseline=size))
+
+
+def test_two_pictures_are_a_rig(scene, folder, tmp_path):
+    """Its baseline has the u that the scene says, its cameras are one, and `stereo` measures with it."""
+    views = scaled(scene, [known(0, 3)]).scene.views()
+    rig = rig_of(views, "0.png", "1.png")
+    assert abs(rig.baseline_m - apart(0, 1)) < 4 * rig.u_baseline_m
+    [m] = measurements(scaled(scene, [known(0, 3)]), {}, ["0.png -> 1.png"]).measurements
+    assert rig.baseline_m == pytest.approx(m.value) and rig.u_baseline_m == pytest.approx(m.u, rel=1e-3)
+    size = 4 + rig.left.coefficients.size
+    assert rig.cov[0, 0] == pytest.approx(rig.cov[0, size]) and np.linalg.eigvalsh(rig.cov).min() > -1e-12
+    turn = ROTATION[1] @ ROTATION[0].T
+    assert rig.right_from_left.rotation == pytest.approx(turn, abs=2e-3)
+    write_pairs(scaled(scene, [known(0, 3)]).scene, read_pairs([f"0.png, 1.png = {tmp_path}/rig.json"]))
+    spot = room.marker_corners()[0] + [0.15, 0.5, 0]
+    x, y = room.seen(ROTATION[0], CENTRE[0], spot)
+    words = [
+        "stereo",
+        folder / "0.png",
+        folder / "1.png",
+        "--rig",
+        tmp_path / "rig.json",
+        "--at",
+        f"{x:.1f},{y:.1f}",
+        "--format",
+        "json",
+    ]
+    result = CliRunner().invoke(main, [str(word) for word in words], catch_exceptions=False)
+    reach = next(m for m in json.loads(result.output)["measurements"] if m["what"] == "range")
+    assert reach["low"] < np.linalg.norm(spot - CENTRE[0]) < reach["high"]
+    for text in ("0.png = x.json", "0.png, 1.png = x.txt", "0.png, 0.png = x.json", "0.png, 1.png = nowhere/x.json"):
+        with pytest.raises(InputError):
+            read_pairs([text])
 
 
 def copies(folder, tmp_path, *pictures):

@@ -118,11 +118,13 @@ def _working() -> Iterator[Callable[[str, float], None]]:
 )
 @click.option("-o", "--output", "outputs", multiple=True, type=click.Path(path_type=Path),
               help="Write the scene: .ply, .las, .geojson, .json, or a folder for COLMAP's files.")  # fmt: skip
+@click.option("--pair", "pairs", multiple=True, metavar="RIG",
+              help="Write two pictures as a rig, for `subtense stereo`: 'a.jpg, b.jpg = rig.json'.")  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["text", "json"]), default="text", show_default=True)
 @click.option("--level", type=float, default=0.95, show_default=True, help="Coverage of the intervals.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the Monte Carlo draws.")
 def reconstruct(folder: Path, measures: tuple[str, ...], camera: str | None, matching: str, mapping: str, features: int,
-                photos: Path | None, outputs: tuple[Path, ...], form: str, level: float, seed: int, unscaled: bool,
+                photos: Path | None, outputs: tuple[Path, ...], pairs: tuple[str, ...], form: str, level: float, seed: int, unscaled: bool,
                 **told: Any) -> None:  # fmt: skip
     """A scene from the pictures in FOLDER, in metres by what is known of its size, and lengths in it with their uncertainty.
 
@@ -131,7 +133,9 @@ def reconstruct(folder: Path, measures: tuple[str, ...], camera: str | None, mat
     """
     from ..workflow.reconstruct_command import Run, run
 
-    asked = Run(folder, measures, camera, matching, mapping, features, photos, outputs, level, seed, unscaled, told)
+    asked = Run(
+        folder, measures, camera, matching, mapping, features, photos, outputs, level, seed, pairs, unscaled, told
+    )
     with _working() as progress:
         shown = run(asked, form, progress)
     click.echo(shown)

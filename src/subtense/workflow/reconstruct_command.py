@@ -21,6 +21,7 @@ from .reconstruct import opened_scene, photos_of, pictures_in, reconstructed
 from .reconstruct_input import read_positions
 from .reconstruct_measure import Asked, measurements, metric
 from .reconstruct_output import check_outputs, scene_json, write
+from .reconstruct_rig import read_pairs, write_pairs
 from .triangulate import unique_names
 
 
@@ -39,6 +40,7 @@ class Run:
         outputs: files to write.
         level: coverage of the intervals.
         seed: of the draws.
+        pairs: of pictures, to be written as rigs.
         unscaled: whether a scene without a scale is wanted.
         known: what tells the scale: distances, checks, marker_size, targets, baseline, heights, positions, accuracy.
     """
@@ -53,6 +55,7 @@ class Run:
     outputs: tuple[Path, ...]
     level: float
     seed: int
+    pairs: tuple[str, ...]
     unscaled: bool
     known: Mapping[str, Any]
 
@@ -64,7 +67,7 @@ def run(asked: Run, form: str, progress: Callable[[str, float], None]) -> str:
         InputError: something missing or impossible, or no scale.
         NothingFoundError: the pictures make no scene.
     """
-    known = _known(asked)
+    known, pairs = _known(asked), read_pairs(asked.pairs)
     scene, photos = _scene(asked, known, progress)
     done: Scaled | None = None
     document: Document | None = None
@@ -74,6 +77,7 @@ def run(asked: Run, form: str, progress: Callable[[str, float], None]) -> str:
         scene = done.scene
         if asked.measures:
             document = measurements(done, photos, asked.measures, level=asked.level, seed=asked.seed)
+    write_pairs(scene, pairs)
     for path in asked.outputs:
         write(path, scene, done, document)
     if form == "json":
@@ -99,7 +103,7 @@ def _known(asked: Run) -> Asked:
     check_outputs(asked.outputs)
     if not known.scale and not asked.unscaled:
         raise InputError("scale", None, f"{WHAT_TO_GIVE}; or --unscaled for a scene in a unit of its own")
-    if not known.scale and (asked.measures or known.checks):
+    if not known.scale and (asked.measures or known.checks or asked.pairs):
         raise InputError("--measure", "without a scale", WHAT_TO_GIVE)
     if not 0.5 <= asked.level <= 0.999:
         raise InputError("--level", asked.level, "give a coverage from 0.5 to 0.999, as 0.95")

@@ -52,19 +52,27 @@ def write(path: Path, scene: Scene, done: Scaled | None, document: Document | No
     Raises:
         InputError: it can't be written, or the scene lacks what the format needs.
     """
-    try:
-        if not path.suffix:
+    if not path.suffix:
+        try:
             path.mkdir(exist_ok=True)
             colmap.write(scene, path)
-            return
-        form = path.suffix.lower()
-        content = (
-            json.dumps(scene_json(scene, done, document), allow_nan=False).encode()
-            if form == ".json"
-            else WRITERS[form](scene)
-        )
-        part = path.with_name(f".{path.name}.part")
+        except OSError as error:
+            raise InputError("--output", str(path), f"it can't be written ({error.strerror or error})") from None
+        return
+    form = path.suffix.lower()
+    data = scene_json(scene, done, document)
+    written(path, json.dumps(data, allow_nan=False).encode() if form == ".json" else WRITERS[form](scene), "--output")
+
+
+def written(path: Path, content: bytes, option: str) -> None:
+    """A file, whole or not at all.
+
+    Raises:
+        InputError: it can't be written.
+    """
+    part = path.with_name(f".{path.name}.part")
+    try:
         part.write_bytes(content)
         part.replace(path)
     except OSError as error:
-        raise InputError("--output", str(path), f"it can't be written ({error.strerror or error})") from None
+        raise InputError(option, str(path), f"it can't be written ({error.strerror or error})") from None
