@@ -2,7 +2,10 @@
 import { ApiError, get, Latest, post, send, type CameraSaid, type Detection, type Doc, type GivenCamera, type MethodRow, type Note, type Outlined, type Photo, type Seen, type Tables, type Target } from "../lib/api";
 import { store } from "../lib/store";
 import { Undo } from "../lib/undo";
+import { Combined } from "./combined.svelte";
+import { requestOf } from "./request";
 import { EMPTY, inputsOf, nextLabel, notesOf, outlineShape, pointFields, PROJECT, readProject, readSheet, sameFound, shapeOf, sigmaOf, snappedTo, wanting, withShape, withSheet, type ProjectSheet, type Session, type Shape, type Sheet } from "./session";
+import { withoutShape } from "./together";
 
 export type Answer = { state: "done"; doc: Doc } | { state: "wants"; fields: string[] } | { state: "refused"; message: string; field: string | null } | { state: "waits" };
 
@@ -32,6 +35,8 @@ export class Model {
   said = $state("");
   /** The sizes of things whose size must be told, by detector. */
   sizes: Record<string, string> = $state({});
+  /** Distances between measurements, and one number from several. */
+  readonly combined = new Combined(this);
 
   private answered: Record<string, { shape: Shape; camera: GivenCamera } | null> = $state.raw({});
   private current = new Map<string, { shape: Shape; camera: GivenCamera }>();
@@ -136,13 +141,14 @@ export class Model {
     const before = this.session;
     this.replace(session);
     this.mark();
-    if (this.shape === undefined) this.selected = null;
+    if (!this.shape && !this.combined.selected) this.selected = null;
     session.sheets.forEach((sheet) => {
       const old = before.sheets.find((other) => other.photo.id === sheet.photo.id);
       if (!old) void this.present(sheet).then(() => this.measureSheet(sheet));
       else if (old.camera !== sheet.camera) void this.readCamera(sheet).then(() => this.measureSheet(sheet));
       else for (const shape of sheet.shapes) if (!old.shapes.includes(shape)) this.measure(shape, sheet);
     });
+    this.combined.renew();
   }
 
   private mark(): void {
@@ -255,8 +261,10 @@ export class Model {
   }
 
   remove(id: string): void {
-    this.change((sheet) => ({ ...sheet, shapes: sheet.shapes.filter((shape) => shape.id !== id) }));
-    if (this.selected === id) this.selected = null;
+    if (this.combined.all.some((one) => one.id === id)) return this.combined.remove(id);
+    this.change((sheet) => withoutShape(sheet, id));
+    if (!this.shape && !this.combined.selected) this.selected = null;
+    this.combined.renew();
   }
 
   setCamera(camera: GivenCamera): void {
@@ -361,7 +369,7 @@ export class Model {
   }
 
   /** Note that the server does not answer, and ask until it does; the message, or null for another error. */
-  private unreachable(error: unknown): string | null {
+  unreachable(error: unknown): string | null {
     if (!(error instanceof ApiError) || error.status !== 0) return null;
     this.reachable = false;
     clearTimeout(this.retrying);
@@ -422,7 +430,10 @@ export class Model {
           this.withPhoto(sheet.photo.id, () =>
             post<Doc>(`/api/measure/${shape.method}`, { photo: sheet.photo.id, camera: sheet.camera, label: shape.label, inputs: inputsOf(shape), notes: notesOf(shape) }),
           ),
-        (doc, { shape, sheet }) => this.isNewest(shape, sheet) && this.tell(shape.id, { state: "done", doc }, shape, sheet),
+        (doc, { shape, sheet }) => {
+          if (this.isNewest(shape, sheet)) this.tell(shape.id, { state: "done", doc }, shape, sheet);
+          else this.combined.renew(shape.id);
+        },
         (error, { shape, sheet }) => {
           if (this.unreachable(error) || !this.isNewest(shape, sheet)) return;
           const field = error instanceof ApiError ? error.field : null;
@@ -437,6 +448,7 @@ export class Model {
   private tell(id: string, answer: Answer, shape?: Shape, sheet?: Sheet): void {
     this.answers = { ...this.answers, [id]: answer };
     this.answered = { ...this.answered, [id]: shape && sheet ? { shape, camera: sheet.camera } : null };
+    this.combined.renew(id);
   }
 
   /** Whether nothing newer was asked of a measurement meanwhile. */
@@ -453,13 +465,19 @@ export class Model {
 
   /** The body of POST /api/measure for a sheet: what it has that can be measured. */
   request(sheet: Sheet): Record<string, unknown> {
-    const items = sheet.shapes
-      .filter((shape) => {
-        const row = this.method(shape.method);
-        return row && !wanting(shape, row).length;
-      })
-      .map((shape) => ({ method: shape.method, label: shape.label, inputs: inputsOf(shape), notes: notesOf(shape) }));
-    return { photo: sheet.photo.id, camera: sheet.camera, items };
+    const able = sheet.shapes.filter((shape) => {
+      const row = this.method(shape.method);
+      return row && !wanting(shape, row).length;
+    });
+    const answered = able.filter((shape) => this.answers[shape.id]?.state === "done" && this.isCurrent(shape));
+    const together = (sheet.together ?? []).filter((one) => this.combined.answers[one.id]?.state === "done" && one.of.every((id) => answered.some((shape) => shape.id === id)));
+    return requestOf(sheet, [...answered, ...able.filter((shape) => !answered.includes(shape))], together);
+  }
+
+  /** What is asked of the current sheet is answered, or a few seconds have passed. */
+  async settled(): Promise<void> {
+    const open = () => this.sheet?.shapes.some((shape) => !this.isCurrent(shape) || this.answers[shape.id]?.state === "waits") || this.combined.all.some((one) => !this.combined.isCurrent(one) || this.combined.answers[one.id]?.state === "waits");
+    for (const end = Date.now() + 4000; open() && Date.now() < end; ) await new Promise((resolve) => setTimeout(resolve, 30));
   }
 
   // -- project files -------------------------------------------------------------------------------------

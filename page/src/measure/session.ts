@@ -1,5 +1,6 @@
 /** What a person measures: photos, their cameras, the shapes drawn on them. Plain data, never changed in place. */
 import type { Detection, GivenCamera, MethodRow, Note, Outlined, Photo, Seen } from "../lib/api";
+import { readTogether, type Together } from "./together";
 
 export type Point = readonly [x: number, y: number];
 
@@ -53,6 +54,8 @@ export interface Sheet {
   photo: Pick<Photo, "id" | "name" | "width_px" | "height_px" | "sha256">;
   camera: GivenCamera;
   shapes: readonly Shape[];
+  /** Distances between them, and which of them are one and the same thing. */
+  together?: readonly Together[];
 }
 
 export interface Session {
@@ -344,7 +347,8 @@ export function readSheet(value: unknown): ProjectSheet | null {
   if (ids.size < shapes.length) return null;
   const { name, width_px, height_px, sha256 } = photo;
   const kept = { id: sha256.slice(0, 32), name, width_px, height_px, sha256 };
-  return { photo: kept, camera, shapes: shapes as Shape[], ...(typeof sheet.data === "string" ? { data: sheet.data } : {}) };
+  const together = readTogether(sheet.together, ids);
+  return { photo: kept, camera, shapes: shapes as Shape[], ...(together.length ? { together } : {}), ...(typeof sheet.data === "string" ? { data: sheet.data } : {}) };
 }
 
 function readShape(value: unknown): Shape | null {
