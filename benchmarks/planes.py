@@ -25,6 +25,8 @@ from subtense.methods import plane  # noqa: E402
 
 DATA = ROOT.parent / "shared" / "data"
 SCENES = 5000
+DRAWS = 6_000
+"""Of a scene where the response bends: an interval end is known to a thirtieth of u."""
 Row = tuple[str, ...]
 
 
@@ -35,13 +37,13 @@ def percent(x: float, digits: int = 1) -> str:
 
 def simulated(scenes: int = SCENES) -> list[Row]:
     """Coverage of the headline and share of truths below and above the interval, for good, typical and bad geometry."""
-    rows: list[Row] = [("what", "geometry", "intervals that hold the truth", "truth below / above")]
+    rows: list[Row] = [("what", "geometry", "scenes", "intervals that hold the truth", "truth below / above")]
     for module in (planes, heights):
         for name in module.SCENARIOS:
             for kind in module.PLANES:
-                hit, below, _ = module.score(name, kind, scenes)
+                hit, below, _ = module.score(name, kind, scenes, draws=DRAWS)
                 held, under = float(hit[:, 0].mean()), float(below[:, 0].mean())
-                rows.append((name, kind, percent(held), f"{percent(under)} / {percent(1 - held - under)}"))
+                rows.append((name, kind, str(scenes), percent(held), f"{percent(under)} / {percent(1 - held - under)}"))
                 print(*rows[-1], sep=" | ", flush=True)
     return rows
 
