@@ -121,10 +121,10 @@ def simulated(rng, count):
 
 
 def test_truth_by_simulation():
-    z, held = simulated(np.random.default_rng(3), 150)
-    assert np.all(abs(z.mean(0)) < 3 / 150**0.5)
-    assert np.all(abs(z.std(0) - 1) < 3 / 300**0.5)
-    assert np.all(abs(held.mean(0) - 0.95) < 3 * (0.95 * 0.05 / 150) ** 0.5)
+    z, held = simulated(np.random.default_rng(3), 80)
+    assert np.all(abs(z.mean(0)) < 3 / 80**0.5)
+    assert np.all(abs(z.std(0) - 1) < 3 / 160**0.5)
+    assert np.all(abs(held.mean(0) - 0.95) < 3 * (0.95 * 0.05 / 80) ** 0.5)
 
 
 def far(distance, sigma=0.5):

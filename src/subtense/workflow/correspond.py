@@ -20,7 +20,7 @@ PATCH = 10
 """Pixels to each side of the point that are compared."""
 SMALL_PATCH = 4
 STEP_PX = 0.7
-MOST_DEPTHS = 300
+MOST_DEPTHS = 200
 AGREE_PX = 1.5
 """How far apart the two sizes of patch may find a point before it is in doubt, to a pixel."""
 REFINED_AGREE_PX = 1.0
@@ -120,7 +120,10 @@ class Finder:
 
     def _best(self, i: int, seen: Array, j: int, inverse: Array, places: Array, half: int) -> int | None:
         """Which inverse depth looks most alike, if nothing apart from it looks nearly so; a small patch need not be unique."""
-        scores = np.array([self._likeness(i, seen, j, 1 / w, half) for w in inverse])
+        want = self._patch(i, seen, np.eye(2), half)
+        if want is None:
+            return None
+        scores = np.array([self._likeness(i, seen, j, 1 / w, want) for w in inverse])
         if not np.any(np.isfinite(scores)):
             return None
         best = int(np.nanargmax(scores))
@@ -140,9 +143,9 @@ class Finder:
         ends = self._at(i, seen + np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1.0]]), j, depth)
         return ends[0], np.stack([(ends[1] - ends[2]) / 2, (ends[3] - ends[4]) / 2], -1)
 
-    def _likeness(self, i: int, seen: Array, j: int, depth: float, half: int) -> float:
+    def _likeness(self, i: int, seen: Array, j: int, depth: float, want: Array) -> float:
         place, slope = self._slope(i, seen, j, depth)
-        return _correlation(self._patch(i, seen, np.eye(2), half), self._patch(j, place, slope, half))
+        return _correlation(want, self._patch(j, place, slope, len(want) // 2))
 
     def _refined(self, i: int, seen: Array, j: int, depth: float, half: int) -> tuple[Array, Array] | None:
         """To a part of a pixel, by Gauss-Newton steps on the difference of the patches, gain and offset free."""
