@@ -1,6 +1,5 @@
 """Distances between measured things, and one number from several, in a real browser."""
 
-import json
 import re
 
 import pytest
@@ -48,9 +47,9 @@ def of_python(examples, body: dict):
     items = [Item(METHODS[one["method"]], one["inputs"], one["label"], judged=True) for one in body["items"]]
     document = measure_items(items, photo, resolve_camera(photo))
     for text in body.get("same", []):
-        document = with_fused(document, text)
+        document = with_fused(document, text, draws=20_000)
     for text in body.get("between", []):
-        document = with_distances(document, text)
+        document = with_distances(document, text, draws=20_000)
     return document
 
 
@@ -86,7 +85,7 @@ def test_it_follows_a_handle_and_is_grey_until_it_is_current(visit, examples):
     page.keyboard.press("d")
     line, caption = page.locator("[data-between='A to B']"), page.locator("[data-distance='A to B'] text").first
     expect(caption).to_contain_text(re.compile(r"\d"))
-    value = caption.text_content().split("  ")[1]  # behind the name, which stands there while selected
+    value = caption.text_content()
     drawn = line.locator(".line").get_attribute("d")
     # what a page would show if the server took its time
     page.route("**/api/measure", lambda route: (page.wait_for_timeout(300), route.continue_()))
@@ -98,10 +97,10 @@ def test_it_follows_a_handle_and_is_grey_until_it_is_current(visit, examples):
     expect(line).to_have_class(re.compile("stale"))
     assert line.locator(".line").get_attribute("d") != drawn  # the line itself never trails
     expect(line).not_to_have_class(re.compile("stale"))  # live: the handle is still held
-    expect(caption).not_to_contain_text(value)
+    expect(caption).not_to_have_text(value)
     page.mouse.up()
     page.get_by_role("button", name="Undo").click()
-    expect(caption).to_contain_text(value)
+    expect(caption).to_have_text(value)
 
 
 def test_it_is_undone_kept_and_goes_with_what_it_is_between(visit, browser, server, examples, tmp_path):
@@ -259,20 +258,3 @@ def test_by_touch_and_keys_and_open_to_all(browser, server, examples, size, them
     page.screenshot(path=tmp_path / f"{size}.png")
     visit.context.close()
     assert visit.unexpected() == []
-
-
-def test_a_damaged_project_loses_only_what_is_damaged(visit, examples, tmp_path):
-    page = opened(visit, examples / "desk.jpg")
-    two(page)
-    pick(page, "A", "B")
-    page.get_by_role("button", name="Distance A to B").click()
-    page.locator("summary").filter(has_text="Save").click()
-    with page.expect_download() as saved:
-        page.get_by_role("button", name="Project with their hashes").click()
-    project = json.loads(saved.value.path().read_text())
-    kept = project["sheets"][0]["together"][0]
-    project["sheets"][0]["together"] = [{**kept, "of": ["x", "y"]}, 7, kept, {**kept, "id": "z"}, {"kind": "between"}]
-    (tmp_path / "p.json").write_text(json.dumps(project))
-    page.locator("input[type=file]").first.set_input_files(tmp_path / "p.json")
-    expect(page.locator("[data-together]")).to_have_count(1)
-    expect(row(page, "A to B").locator("strong")).to_have_text(re.compile(r"\d"))

@@ -106,3 +106,8 @@ def measured(page: Page, examples: Path, size: str) -> None:
     page.get_by_label("First side").fill("210 ± 1 mm")
     page.get_by_label("Second side").fill("297 ± 1 mm")
     expect(page.locator("[data-shape=A]")).to_contain_text("mm")
+    if size == "desktop":
+        for label in ("36h11 id 7", "A"):
+            page.get_by_role("checkbox", name=f"Pick {label}", exact=True).check()
+        page.get_by_role("button", name="Distance 36h11 id 7 to A").click()
+        expect(page.get_by_test_id("together").get_by_test_id("answer")).to_contain_text("mm")

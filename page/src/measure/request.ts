@@ -6,7 +6,8 @@ import { MOST, type Kind, type Together } from "./together";
 export function distinctLabels(shapes: readonly Shape[]): string[] {
   const names: string[] = [];
   for (const shape of shapes) {
-    const wished = shape.label.trim().slice(0, 90) || "unnamed";
+    // a name with a method behind it is a check's, which the server does not count
+    const wished = (shape.label.trim().slice(0, 90) || "unnamed").replace(new RegExp(`, by ${shape.method}$`), (end) => ` (${end.slice(2)})`);
     let name = wished;
     for (let n = 2; names.includes(name); n += 1) name = `${wished} (${n})`;
     names.push(name);

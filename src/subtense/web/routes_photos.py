@@ -41,6 +41,8 @@ from .uploads import read_form, shown_name
 router = APIRouter(prefix="/api")
 ALL = "all"
 """Instead of a detector's name: those that look unasked, or find the targets that are said."""
+DRAWS = 20_000
+"""Of what is calculated from several items: an answer while a handle is dragged; ends of intervals scatter by 0.02 u."""
 Id = Annotated[str, InPath(pattern="^[0-9a-f]{32}$", description="from POST /api/photos")]
 _UPLOAD = {
     "requestBody": {
@@ -189,9 +191,9 @@ def post_sheet(request: Request, body: models.Sheet, form: Format = "json") -> R
         items, photo.photo, camera_for(state_of(request), photo, body.camera), level=body.level, seed=body.seed
     )
     for text in body.same:
-        document = with_fused(document, text, option="same", level=body.level, seed=body.seed)
+        document = with_fused(document, text, option="same", level=body.level, seed=body.seed, draws=DRAWS)
     for text in body.between:
-        document = with_distances(document, text, option="between", level=body.level, seed=body.seed)
+        document = with_distances(document, text, option="between", level=body.level, seed=body.seed, draws=DRAWS)
     return shown(document, form, photo.photo)
 
 

@@ -78,7 +78,13 @@ def chosen(things: Sequence[Thing], text: str, option: str) -> list[Thing]:
 
 
 def with_distances(
-    document: Document, text: str, *, option: str = "--between", level: float = 0.95, seed: int = 0
+    document: Document,
+    text: str,
+    *,
+    option: str = "--between",
+    level: float = 0.95,
+    seed: int = 0,
+    draws: int | None = None,
 ) -> Document:
     """The document with the distances between things.
 
@@ -88,6 +94,7 @@ def with_distances(
         option: what an error calls the text.
         level: coverage of the intervals.
         seed: of the draws.
+        draws: how many, where they are needed; None for as many as two digits of u need.
 
     Raises:
         InputError: a thing that there is not, or that has no place in the camera's frame.
@@ -107,7 +114,7 @@ def with_distances(
     shapes: list[Shape] = []
     for one, other in pairs:
         label = f"{one.label or 'line'} to {other.label or 'line'}"
-        found += between(one.pair, other.pair, level=level, seed=seed, label=label)
+        found += between(one.pair, other.pair, level=level, seed=seed, draws=draws, label=label)
         shapes.append(Shape((_middle(document, one.label), _middle(document, other.label)), False, label))
     return dataclasses.replace(document, measurements=(*document.measurements, *improved(tuple(found))),
                                shapes=(*document.shapes, *shapes))  # fmt: skip
@@ -121,12 +128,19 @@ def _middle(document: Document, label: str) -> tuple[float, float]:
 
 
 def with_fused(
-    document: Document, text: str, *, option: str = "--same", level: float = 0.95, seed: int = 0
+    document: Document,
+    text: str,
+    *,
+    option: str = "--same",
+    level: float = 0.95,
+    seed: int = 0,
+    draws: int | None = None,
 ) -> Document:
-    """The document with one number from several things that are one and the same, as "1,2"."""
+    """The document with one number from several things that are one and the same, as "1,2"; else as `with_distances`."""
     named = chosen(things_of(document), text, option)
     label = " and ".join(thing.label or "line" for thing in named)
-    one = fuse([t.pair for t in named], level=level, seed=seed, label=label, labels=[t.label for t in named]).one
+    pairs, labels = [thing.pair for thing in named], [thing.label for thing in named]
+    one = fuse(pairs, level=level, seed=seed, draws=draws, label=label, labels=labels).one
     return dataclasses.replace(document, measurements=(*document.measurements, *improved((one,))))
 
 
