@@ -195,3 +195,98 @@ def test_the_ground_on_the_command_line(photo, tmp_path):
     assert told.exit_code != 0 and "--point" in told.output
     told = run("ground", photo, "--camera", "f=1500px", "--point", "800,900", "--terrain", "hill.tif", *STANDS)
     assert told.exit_code != 0 and "--position" in told.output
+
+
+def test_bare_numbers_of_a_method_in_a_photo_are_refused(photo):
+    """There is no field that shows a unit beside it."""
+    for words in (("--distance", "8.09 ± 0.02", "--tilt", "0 deg"), ("--distance", "8 m", "--tilt", "0.7854 exact")):
+        told = run(
+            "method",
+            "known_distance",
+            "--photo",
+            photo,
+            "--camera",
+            "f=1500 ± 5px",
+            "--ends",
+            "100,100;100,600",
+            *words,
+        )
+        assert told.exit_code != 0 and "give a" in told.output
+
+
+def test_width_and_height_of_a_sheet_that_was_found(examples):
+    told = [run("measure", examples / "desk.jpg", "--only", "sheets", "--size", text, "--format", "json")
+            for text in ("297 x 210 mm", "210 ± 1 mm x 297 ± 1 mm")]  # fmt: skip
+    ranges = [next(m["value"] for m in json.loads(t.output)["measurements"] if m["label"] == "sheet") for t in told]
+    assert ranges == pytest.approx([0.652, 0.652], rel=0.01)
+    one = json.loads(
+        run("measure", examples / "desk.jpg", "--only", "sheets", "--size", "297 mm", "--format", "json").output
+    )
+    assert "sheet" not in {m["label"] for m in one["measurements"]}
+    assert any(note["code"] == "size_unknown" and "width and height" in note["cure"] for note in one["notes"])
+
+
+def test_marked_lines_are_measured_where_nothing_is_found(photo):
+    told = run("measure", photo, "--camera", "f=1500px", "--line", "100,100,100,600", "--size", "1.75 m", "--marker-size", "50 mm",
+               "--format", "json")  # fmt: skip
+    found = json.loads(told.output)
+    assert found["measurements"][0]["what"] == "range"
+    assert "nothing_found" in {note["code"] for note in found["notes"]}
+
+
+def test_wrong_options_are_told_in_a_line(photo):
+    for words in (
+        ["plan", "--accuracy", "1 cm"],
+        ["measure"],
+        ["ground", photo, "--pont", "1,2"],
+        ["measure", photo, "--seed", "abc"],
+    ):
+        told = run(*words)
+        assert told.exit_code == 2 and told.output.startswith("subtense: ") and len(told.output.splitlines()) == 1
+        assert "--help" in told.output
+
+
+def test_nothing_but_refusals_is_an_error(photo):
+    told = run(
+        "ground", photo, "--camera", "f=1500 ± 5px", *STANDS, "--point", "800,300", "--length", "700,200;800,300"
+    )
+    assert told.exit_code == 3 and len(told.output.splitlines()) == 1 and "horizon" in told.output
+
+
+def test_the_longest_extent_of_a_box_goes_from_corner_to_corner(examples):
+    """The package of 200 x 150 mm: its diagonal is taken for the size given, which is told."""
+    words = (
+        "measure",
+        examples / "belt.jpg",
+        "--outline",
+        "450,330,1050,800",
+        "--size",
+        "200 mm",
+        "--camera",
+        "f=2685.3 ± 3 px",
+        "--format",
+        "json",
+    )
+    found = json.loads(run(*words).output)["measurements"]
+    assert "across_corners" in codes(found[0])
+    side = json.loads(run(*words, "--extent", "width").output)["measurements"]
+    assert "across_corners" not in codes(side[0])
+
+
+def test_a_point_that_snaps_far_is_doubted(examples):
+    """The foot goes to the edge of a shadow, 3.5 px off and five times as far as a mark is off by chance."""
+    words = ("measure", examples / "street.jpg", "--camera", "f=1829 ± 3px", "--line", "672.3,897.2,668.4,499.2",
+             "--size", "1.75 ± 0.001 m", "--tilt", "0 ± 1 deg", "--snap", "--format", "json")  # fmt: skip
+    m = json.loads(run(*words).output)["measurements"][1]
+    assert "snapped_far" in codes(json.loads(run(*words).output)["measurements"][0])
+    assert abs(m["value"] - 8.05) < 3 * m["u"]
+
+
+def test_a_part_of_the_same_proportions_is_told_as_possible(examples, tmp_path):
+    with Image.open(examples / "street.jpg") as whole:
+        whole.crop((300, 200, 1500, 1000)).save(tmp_path / "cut.jpg", exif=whole.getexif())
+    told = run(
+        "measure", tmp_path / "cut.jpg", "--line", "372,697,368,299", "--size", "1.75 ± 0.02 m", "--format", "json"
+    )
+    note = next(note for note in json.loads(told.output)["notes"] if note["code"] == "resized")
+    assert "cut out instead, all distances are 1.5 times" in note["text"]

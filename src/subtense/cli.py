@@ -64,6 +64,10 @@ class _Group(click.Group):
         except SubtenseError as error:
             click.echo(f"subtense: {_one_line(str(error))}", err=True)
             ctx.exit(error.exit_code)
+        except click.UsageError as error:
+            where = error.ctx.command_path if error.ctx else "subtense"
+            click.echo(f"subtense: {_one_line(error.format_message())} See {where} --help", err=True)
+            ctx.exit(error.exit_code)
         except BrokenPipeError:
             sys.stderr.close()
             ctx.exit(0)

@@ -199,8 +199,9 @@ def _by_size(photo: Photo, found: TaggedSize) -> TaggedSize:
         return found
     sizes = f"taken with {then[0]} x {then[1]} px, now {now[0]} x {now[1]} px"
     if abs(sx / sy - 1) < 0.01:
-        text = f"the picture was resized ({sizes}); the focal length is scaled with it"
-        return _noted(replace(found, scale=sx), Note("resized", text, "use the original picture"))
+        text = (f"the picture is taken to be resized ({sizes}), and the focal length is scaled with it; if a part of these very "
+                f"proportions was cut out instead, all distances are {1 / sx:.3g} times what is told")  # fmt: skip
+        return _noted(replace(found, scale=sx), Note("resized", text, "use the original picture, or give the camera"))
     # the whole picture, scaled, holds this one: between cut in one direction only and cut without being resized
     least = max(sx, sy)
     scale = (least + 1) / 2 if least < 1 else least

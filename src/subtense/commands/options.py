@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import InputError
+from ..errors import GeometryError, InputError
 
 if TYPE_CHECKING:
     from ..document import Document
@@ -34,6 +34,10 @@ def show(document: Document, form: str, files: tuple[Path, ...] = (), photo: Pho
     """Write the files, then print the document: text goes to the terminal, a picture or a PDF to a pipe."""
     from ..workflow.report_of import report_of, write_report
 
+    refused = [note.text for note in document.notes if note.code == "refused"]
+    if refused and not document.measurements:
+        more = f" (and {len(refused) - 1} more without an answer)" if len(refused) > 1 else ""
+        raise GeometryError(refused[0] + more, code="refused")
     for file in files:
         write_report(document, photo, file)
     shown = report_of(form, photo=photo is not None).function(document, photo)

@@ -16,7 +16,7 @@ from ..propagate import Combination, measure_together, sample_together
 from ..quantity import Measurement, Note
 from .given import given
 
-DRAWS = 100_000
+DRAWS = 50_000
 """Of the difference of two places, where its length is near its noise."""
 
 
@@ -48,7 +48,7 @@ def between(
         second: likewise; nouns that are the same in both (the camera, a reference) are moved together.
         level: coverage of the intervals.
         seed: of the draws.
-        draws: how many; None for as many as two digits of u need.
+        draws: how many, where they are needed; None for DRAWS.
         label: what is measured.
 
     Returns:
@@ -62,7 +62,14 @@ def between(
     kept = {name: {"method": method.name, "given": given(inputs)} for name, (method, inputs) in zip(("first", "second"), pairs,
                                                                                                     strict=True)}  # fmt: skip
     length, deeper = measure_together(
-        pairs, BETWEEN, level=level, seed=seed, draws=draws, label=label, given=kept, notes=lambda: _doubts(pairs)
+        pairs,
+        BETWEEN,
+        level=level,
+        seed=seed,
+        draws=draws or DRAWS,
+        label=label,
+        given=kept,
+        notes=lambda: _doubts(pairs),
     )
     drawn = sample_together(pairs, _STEP, draws or DRAWS, seed=seed).values
     answered = drawn[:, np.isfinite(drawn).all(axis=0)]

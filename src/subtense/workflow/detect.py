@@ -7,9 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from ..arrays import Array
 from ..detection import Detection, Search
 from ..document import Document, Shape
 from ..errors import InputError, MissingExtraError, UnknownCameraError
+from ..observation import Observation
 from ..photo import Photo
 from ..quantity import Note, Quantity
 from ..target import Target
@@ -173,12 +177,31 @@ def item_of(detection: Detection, size: Target | Quantity | str | None = None) -
         told = size_of(detection)
     if told is None:
         return None
+    if isinstance(told, Target) and detection.shape not in ("square", "rectangle"):
+        return None  # width and height are told of a sheet
+    if isinstance(told, Quantity) and detection.shape == "rectangle":
+        return None  # one length is no width and height
+    if isinstance(told, Target) and detection.shape == "rectangle":
+        told = _turned_as_seen(told, detection.seen)
     if isinstance(told, Quantity) and way.size == "target":
         told = Target.square(told, SQUARE)  # of one name, so that what is told of all squares is one doubt
     inputs: dict[str, Any] = {way.points: detection.seen, way.size: told}
     if detection.tilt is not None and detection.shape == "length":
         inputs["tilt"] = detection.tilt
     return Item(METHODS[way.method], inputs, detection.label)
+
+
+def _turned_as_seen(told: Target, seen: Observation) -> Target:
+    """Width and height that a person told, exchanged where the seen corners go round the other way about."""
+
+    def first_over_second(corners: Array) -> float:
+        sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=-1)
+        return float((sides[0] + sides[2]) / (sides[1] + sides[3]))
+
+    if (first_over_second(told.points_m) > 1) == (first_over_second(seen.points_px) > 1):
+        return told
+    points = told.points_m[:, [1, 0, 2]][[0, 3, 2, 1]]  # mirrored, and gone round from the same corner
+    return dataclasses.replace(told, points_m=points, id=None)
 
 
 def size_of(detection: Detection) -> Target | Quantity | None:

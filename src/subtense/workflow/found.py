@@ -13,6 +13,7 @@ from ..document import Document
 from ..errors import InputError, NothingFoundError
 from ..photo import Photo
 from ..quantity import Quantity
+from ..target import Target
 from ..targets import find_target
 from .detect import Found, detect, detectors_for
 from .measure import Standing, measure_detections
@@ -80,7 +81,7 @@ def _nothing(photo: Photo, asked: Asked, found: Found) -> NothingFoundError:
 
 
 def measured(
-    photo: Photo, asked: Asked, *, size: Quantity | None = None, marker_size: Quantity | None = None,
+    photo: Photo, asked: Asked, *, size: Quantity | Target | None = None, marker_size: Quantity | None = None,
     camera: str | None = None, standing: Standing | None = None, level: float = 0.95, seed: int = 0,
     progress: Progress | None = None,
 ) -> Document:  # fmt: skip
@@ -89,7 +90,7 @@ def measured(
     Args:
         photo: the picture.
         asked: what to look for.
-        size: of things that nothing else tells the size of: side, length or diameter, m.
+        size: of things that nothing else tells the size of: side, length or diameter, m; or width and height.
         marker_size: side of markers' black square, m.
         camera: what the user said of it; None to go by the photo.
         standing: how the camera stands above the ground.

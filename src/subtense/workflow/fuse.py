@@ -68,7 +68,7 @@ def fuse(
     Source: weighted means of correlated quantities, GUM H.2 and A. C. Aitken, 1936; R. T. Birge, Phys. Rev. 40, 1932.
     """
     if len(pairs) < 2:
-        raise InputError("fuse", f"{len(pairs)} measurements", "give two or more of the same thing")
+        raise InputError("measurements", f"{len(pairs)}", "give two or more of the same thing")
     names = [labels[i] if i < len(labels) and labels[i] else f"{m.name} {i + 1}" for i, (m, _) in enumerate(pairs)]
     outputs = _outputs(pairs, what)
     ready = [(method, method.prepare(inputs)) for method, inputs in pairs]
@@ -218,7 +218,10 @@ def _widened(
     high = None if high is None else max(high, float(values.max()))
     said = ", ".join(f"{name}: {value:.4g} {one.unit}" for name, value in zip(names, values, strict=True))
     text = f"the measurements contradict each other beyond their u ({said}); the interval is widened {factor:.2g} times"
-    wider = dataclasses.replace(one, u=one.u * factor, low=None if low is None else max(low, 0.0), high=high)
+    budget = tuple(dataclasses.replace(line, u=line.u * factor) for line in one.budget)
+    wider = dataclasses.replace(
+        one, u=one.u * factor, budget=budget, low=None if low is None else max(low, 0.0), high=high
+    )
     return wider, [Note("methods_disagree", text, "check the assumptions of each; one of them does not hold")]
 
 

@@ -125,16 +125,27 @@ def _with_defaults(method: Method, values: Mapping[str, Any], *, in_photo: bool)
     for field in dataclasses.fields(method.inputs):
         value = found.get(field.name)
         if isinstance(value, str) and kinds[field.name] is Quantity:
-            unit, how = field.metadata["unit"], field.metadata.get("assume")
-            assume = getattr(assumptions, how) if how else None
-            bare = BARE.get(unit) if how else NAMED.get(unit)
-            read = Quantity.parse(value, unit, bare=bare, name=field.name, assume=assume)
-            found[field.name] = read if field.metadata.get("signed") else _sensible(read, field.name, value)
+            bare = BARE if field.metadata.get("assume") else NAMED
+            found[field.name] = read_quantity(field, value, bare.get(field.metadata["unit"]))
         elif isinstance(value, str) and kinds[field.name] is Target:
             found[field.name] = Target.parse(value, name=field.name, assume=assumptions.size)
         elif value is None and in_photo and "in_photo" in field.metadata:
             found[field.name] = field.metadata["in_photo"]()
     return found
+
+
+def read_quantity(field: dataclasses.Field[Any], text: str, bare: str | None) -> Quantity:
+    """What a person typed for a field of Inputs, with what is assumed of it where nothing was said.
+
+    Args:
+        field: of a Quantity.
+        text: as typed.
+        bare: the unit of a bare number, as `Quantity.parse` takes it.
+    """
+    how = field.metadata.get("assume")
+    assume = getattr(assumptions, how) if how else None
+    read = Quantity.parse(text, field.metadata["unit"], bare=bare, name=field.name, assume=assume)
+    return read if field.metadata.get("signed") else _sensible(read, field.name, text)
 
 
 def _sensible(quantity: Quantity, name: str, text: str) -> Quantity:

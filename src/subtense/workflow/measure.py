@@ -23,9 +23,9 @@ from ..quantity import Measurement, Note, Quantity
 from ..target import Target
 from ..targets import KnownTarget
 from .detect import Found, detect, item_of
-from .given import from_file, inputs_from_json, inputs_from_text, read_json
+from .given import NAMED, from_file, inputs_from_json, inputs_from_text, read_json
 from .grade import graded_line
-from .in_photo import Item, item_inputs, measure_item
+from .in_photo import Item, item_inputs, measure_item, read_quantity
 from .resolve_camera import CAMERA_SOURCES, Resolved, resolve_camera
 from .size_convention import planes_of, size_convention
 from .ways import ground_item, measure_ways, stands
@@ -146,7 +146,8 @@ def measure_detections(
         item = item_of(one, sizes.get(detector, sizes.get("")) if one.target is None else None)
         if item is None:
             notes += [dataclasses.replace(note, text=f"{one.label}: {note.text}") for note in one.notes]
-            notes.append(Note("size_unknown", f"{one.label}: found, and nothing tells its size", "give its size"))
+            cure = "give its width and height, as 210 x 297 mm" if one.shape == "rectangle" else "give its size"
+            notes.append(Note("size_unknown", f"{one.label}: found, and nothing tells its size", cure))
             continue
         ways = [item]
         if ground is not None and stands(one, detector):
@@ -218,13 +219,23 @@ def measure_inputs(
             raise FileFormatError(file, "holds no object of inputs")
         given = dict(data.get("given", data))
     if photo is not None:
-        values = {name: from_file(text) for name, text in texts.items()} if file is None else given
+        values = _typed_in_photo(method, texts) if file is None else given
         told = values.pop("camera", None) if isinstance(values.get("camera"), str) else None
         return measure_item(Item(method, values, judged=True), photo, camera_of(photo, told), level=level, seed=seed)
     inputs = inputs_from_text(method, texts) if file is None else inputs_from_json(method, given)
     return measure_item(
         Item(method, {k: v for k, v in vars(inputs).items() if v is not None}), None, None, level=level, seed=seed
     )
+
+
+def _typed_in_photo(method: Method, texts: Mapping[str, str]) -> dict[str, Any]:
+    """Texts as typed; a quantity needs its unit, as no field stands beside it that shows one."""
+    values: dict[str, Any] = {name: from_file(text) for name, text in texts.items()}
+    for field in dataclasses.fields(method.inputs):
+        text = values.get(field.name)
+        if isinstance(text, str) and "unit" in field.metadata:
+            values[field.name] = read_quantity(field, text, NAMED.get(field.metadata["unit"]))
+    return values
 
 
 def camera_of(photo: Photo, told: str | None = None) -> Resolved | UnknownCameraError:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .. import assumptions
 from ..detection import parse_curve, unknown_curve
 from ..document import Document
-from ..errors import InputError
+from ..errors import InputError, NothingFoundError
 from ..observation import Observation
 from ..photo import Photo
 from ..quantity import Note, Quantity
+from ..target import Target
 from .found import Asked, Progress, measured
 from .ground import GROUND, START, GroundTexts, standing
 from .measure import Standing, joined, measure_lines
@@ -72,9 +74,14 @@ def measure_document(
         found.append(with_line_notes(document, notes))
     if asked is not None:
         side = None if marker_size is None else read_length(marker_size, "--marker-size")
-        size = read_length(sizes[0], "--size") if sizes and not lines else None
-        found.append(measured(photo, asked, size=size, marker_size=side, camera=camera, standing=standing, level=level,
-                              seed=seed, progress=progress))  # fmt: skip
+        size = read_size(sizes[0], "--size") if sizes and not lines else None
+        try:
+            found.append(measured(photo, asked, size=size, marker_size=side, camera=camera, standing=standing, level=level, seed=seed,
+                                  progress=progress))  # fmt: skip
+        except NothingFoundError as error:
+            if not lines:
+                raise
+            found[0] = dataclasses.replace(found[0], notes=(*found[0].notes, Note("nothing_found", str(error))))
     document = joined(found)
     for text in same:
         document = with_fused(document, text, level=level, seed=seed)
@@ -112,6 +119,17 @@ def read_length(text: str, name: str) -> Quantity:
     if not float(length.value) > 0:
         raise InputError(name, text, "give a length above 0")
     return length
+
+
+def read_size(text: str, name: str) -> Quantity | Target:
+    """A length as `read_length`, or width x height."""
+    if re.search(r"\d\D*\sx\s", text):
+        width, _, height = re.sub(r"\sx\s", " x ", text).partition(" x ")
+        unit = re.search(r"[a-zµ]+\s*(\(.*\))?\s*$", height)
+        if unit and not re.search(r"[a-zµ]", width):  # 210 x 297 mm
+            width += " " + unit[0].split("(")[0].strip()
+        return Target.rectangle(read_length(width, name), read_length(height, name), "rectangle")
+    return read_length(text, name)
 
 
 def gray_will_do(asked: Asked, marker_size: str | None, lines: Sequence[str]) -> bool:

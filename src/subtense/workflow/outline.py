@@ -73,8 +73,31 @@ def outline_document(
         size = lengths[number] if len(lengths) > 1 else lengths[0]
         inputs = {"ends": seen, "size": size, **({"tilt": angle} if angle else {})}
         document = measure_item(Item(known_size.METHOD, inputs, label), photo, resolved, level=level, seed=seed)
-        documents.append(_whole(document, found, (*found.notes, *doubts), label))
+        notes = (*found.notes, *doubts, *(_across_corners(found) if extent == "longest" else ()))
+        documents.append(_whole(document, found, notes, label))
     return joined(documents)
+
+
+CORNERED = 1.03
+"""Longest extent over the longer side of the narrowest box, beyond which it goes from corner to corner."""
+
+
+def _across_corners(found: Outline) -> tuple[Note, ...]:
+    """The note `across_corners` on a thing that is longer from corner to corner than its side is."""
+    box = found.extents["box"].points_px
+    side = max(float(np.hypot(*(box[i] - box[i - 1]))) for i in (1, 2))
+    longest = float(np.hypot(*np.diff(found.extents["longest"].points_px, axis=0)[0]))
+    if longest <= CORNERED * side:
+        return ()
+    text = (f"its longest extent goes from corner to corner, and is {100 * (longest / side - 1):.0f} % longer than the longer side of "
+            "the narrowest box around it; the size given must be that")  # fmt: skip
+    return (
+        Note(
+            "across_corners",
+            text,
+            "if the size is that of a side, give --extent width or height, or mark the side with --line",
+        ),
+    )
 
 
 def outlined(

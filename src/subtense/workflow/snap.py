@@ -21,6 +21,8 @@ ALONG = math.cos(math.radians(15.0))
 """A line within 15 degrees of a corner's edge runs along it, and ends in the corner."""
 CORNER_SHARE = 0.5
 """Of the contrast of the edge across the line: with less along the line, it is a mark on the thing and no corner of it."""
+FAR_SIGMAS = 4.5
+"""Of a marked point's standard deviation: a longer way to the edge is no chance of the hand."""
 APART_PX = 2.0
 """Another edge that lies nearer to the chosen one is the same."""
 
@@ -57,9 +59,28 @@ def snapped(
     for i, (_, own, _) in enumerate(ends):
         cov[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += own
     far = np.hypot(*(points - marked).T)
+    cov, doubts = _moved_far(cov, points - marked, observation)
     text = f"the marked points were moved to edges near them, by {', '.join(f'{px:.1f}' for px in far)} px"
     found = Observation(points, cov=cov, label=observation.label, source="edges near the marked points")
-    return found, (Note("snapped", text, "look at the overlay"), *notes)
+    return found, (Note("snapped", text, "look at the overlay"), *doubts, *notes)
+
+
+def _moved_far(cov: Array, steps: Array, marked: Observation) -> tuple[Array, list[Note]]:
+    """The covariance with half of each step added that is longer than a marked point is off by chance, and the note `snapped_far`."""
+    stated = np.sqrt(np.sum(marked.standard_deviations.reshape(-1, 2) ** 2, axis=-1) / 2)
+    cov, far = cov.copy(), []
+    for i, step in enumerate(steps):
+        length = float(np.hypot(*step))
+        if length > FAR_SIGMAS * float(stated[i]):
+            cov[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += np.outer(step, step) / 4
+            far.append(f"{length:.1f} px")
+    if not far:
+        return cov, []
+    text = (f"a point was moved by {', '.join(far)}, farther than a mark is off by chance: what it was moved to may be another edge, a "
+            "shadow or a pattern; half of that is in u")  # fmt: skip
+    return cov, [
+        Note("snapped_far", text, "mark it closer to the edge that is meant, or state how well it is marked, as ± 2px")
+    ]
 
 
 def snapped_lines(

@@ -179,7 +179,8 @@ def _thing_in(source: str) -> Thing:
     if not label and len(heads) == 1:
         label = next(iter(heads))
     if label not in heads:
-        raise InputError("file", source, f"name one of its things, as {Path(name).name}#{next(iter(heads), 'label')}"
+        names = ", ".join(repr(head) for head in heads)
+        raise InputError("file", source, f"write one of its things behind #; it has {names}"
                          if heads else "it holds no measurement that can be combined")  # fmt: skip
     m = heads[label]
     method = METHODS[m["method"]]
