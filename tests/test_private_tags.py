@@ -22,7 +22,7 @@ def with_position(**tags):
 
 
 EXPECTED = {
-    "latitude": "-12.510000", "longitude": "8.250000", "altitude above the sea": "-12.5 m", "camera serial number": "B-12",
+    "latitude": "-12.51000000", "longitude": "8.25000000", "altitude above the sea": "-12.500 m", "camera serial number": "B-12",
     "lens serial number": "L-9",
 }  # fmt: skip
 
@@ -62,7 +62,7 @@ def test_no_other_output_has_them(tmp_path):
         for secret in ("12.51", "8.25", "B-12", "L-9"):
             assert secret not in shown
     asked = CliRunner().invoke(main, ["camera", str(path), "--private"], catch_exceptions=False).output
-    assert "latitude: -12.510000" in asked and "B-12" in asked
+    assert "latitude: -12.51000000" in asked and "B-12" in asked
 
 
 def test_a_picture_without_any(tmp_path):

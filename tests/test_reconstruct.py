@@ -4,10 +4,13 @@ import dataclasses
 import itertools
 import json
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from PIL import Image
+from PIL.TiffImagePlugin import IFDRational
 from tests import scene_pictures as room
 
 from subtense.camera import Camera
@@ -200,6 +203,30 @@ def test_latitude_and_longitude(tmp_path, scene, photos):
     ] and wrong.relative_u > 3 * done.relative_u
     with pytest.raises(InputError, match="--accuracy"):
         metric(scene, photos, Asked(positions=tmp_path / "g.csv"))
+
+
+def test_positions_in_the_pictures_own_files(tmp_path, scene, photos):
+    """As a drone with RTK writes them, to a hundredth of a millimetre."""
+    tagged = {}
+    for i, name in enumerate(NAMES):
+        with Image.open(photos[name]) as picture:
+            exif = Image.Exif()
+            exif[0x10F] = "M"  # Pillow writes none without a tag of the picture itself
+            gps = exif.get_ifd(0x8825)
+            for tag, ref, degrees in ((2, "N", 47 - CENTRE[i][0] / 111e3), (4, "E", 8 + CENTRE[i][2] / 76e3)):
+                minutes = degrees % 1 * 60
+                gps[tag - 1], gps[tag] = (
+                    ref,
+                    (int(degrees), int(minutes), IFDRational(round(minutes % 1 * 60e6), 1_000_000)),
+                )
+            gps[5], gps[6] = b"\0", IFDRational(round(1e5 * (400 - CENTRE[i][1])), 100_000)
+            picture.save(tmp_path / name, exif=exif)
+        tagged[name] = tmp_path / name
+    done = metric(scene, tagged, Asked(positions=Path("tags"), accuracy="1 cm (1s)"))
+    [only] = measurements(done, tagged, ["0.png -> 1.png"]).measurements
+    assert only.low < apart(0, 1) < only.high
+    with pytest.raises(InputError, match="0 of 5 pictures tell a position"):
+        metric(scene, photos, Asked(positions=Path("tags"), accuracy="1 cm (1s)"))
 
 
 def test_without_a_scale_there_are_no_metres(scene, photos):

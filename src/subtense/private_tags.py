@@ -1,6 +1,6 @@
 """Private tags: where a picture was taken and with which specimen of a camera. Read only where somebody asks for it by name.
 
-Nothing else in subtense reads these: a report, a page and a calibration never have them.
+A report, a page and a calibration never have them; a reconstruction reads positions where a person asks for those of the files.
 
 Source: Exif 2.32, GPS IFD (4.6.6) and BodySerialNumber, LensSerialNumber; DJI's drone-dji namespace; Adobe's aux.
 """
@@ -47,16 +47,31 @@ def private_tags(path: Path) -> dict[str, str]:
     return found
 
 
+def position_of(path: Path) -> tuple[float, float, float] | None:
+    """Latitude and longitude (degrees) and altitude above the sea (m) of a picture's file; None where it does not tell all three.
+
+    Raises:
+        FileFormatError: no such file, or no picture.
+    """
+    found = private_tags(path)
+    try:
+        latitude, longitude = float(found["latitude"]), float(found["longitude"])
+        altitude = float(found["altitude above the sea"].removesuffix(" m"))
+    except (KeyError, ValueError):
+        return None
+    return latitude, longitude, altitude
+
+
 def _by_exif(tags: Mapping[int, Any]) -> dict[str, str]:
     found = {}
     for what, tag, negative in (("latitude", 2, "S"), ("longitude", 4, "W")):
         angle = _degrees(tags.get(tag))
         if angle is not None:
-            found[what] = f"{-angle if tags.get(tag - 1) == negative else angle:.6f}"
+            found[what] = f"{-angle if tags.get(tag - 1) == negative else angle:.8f}"
     height = number(tags.get(6))
     if height is not None:
         below = tags.get(5) == 1
-        found["altitude above the sea"] = f"{-height if below else height:.1f} m"
+        found["altitude above the sea"] = f"{-height if below else height:.3f} m"
     serials = ((what, text_of(tags.get(tag))) for tag, what in _SERIALS.items())
     return found | {what: text for what, text in serials if text}
 

@@ -100,7 +100,8 @@ def _working() -> Iterator[Callable[[str, float], None]]:
 @click.option("--camera-height", "heights", multiple=True, metavar="HEIGHT",
               help="Scale by a picture's height over three points of the ground: 'a.jpg = 1.6 m over END | END | END'.")  # fmt: skip
 @click.option("--positions", type=click.Path(path_type=Path), metavar="FILE",
-              help="Scale by where pictures were taken: a table name,x,y,z[,u] in m, or name,lat,lon,alt[,u].")  # fmt: skip
+              help="Scale by where pictures were taken: a table name,x,y,z[,u] in m, or name,lat,lon,alt[,u]; "
+              "or tags, for the positions in the pictures' own files.")  # fmt: skip
 @click.option("--accuracy", metavar="LENGTH", help='Of positions that state none, as "2 cm (1s)" for RTK.')
 @click.option(
     "--unscaled", is_flag=True, help="Without a scale: write the scene in a unit of its own, measure nothing."

@@ -18,7 +18,7 @@ from ..reports import text as text_report
 from ..scale import Scaled
 from ..scene import WHAT_TO_GIVE, Scene
 from .reconstruct import opened_scene, photos_of, pictures_in, reconstructed
-from .reconstruct_input import read_positions
+from .reconstruct_input import positions_told
 from .reconstruct_measure import Asked, measurements, metric
 from .reconstruct_output import check_outputs, scene_json, write
 from .reconstruct_rig import read_pairs, write_pairs
@@ -121,7 +121,7 @@ def _scene(asked: Run, known: Asked, progress: Callable[[str, float], None]) -> 
     engine()
     positions = None
     if known.positions is not None:
-        found = read_positions(known.positions).of
+        found = positions_told(known.positions, dict(zip(unique_names(paths), paths, strict=True))).of
         positions = {name: (float(p[0]), float(p[1]), float(p[2])) for name, (p, _) in found.items()}
     settings = Settings(asked.matching, asked.mapping, asked.features)
     scene = reconstructed(paths, camera=asked.camera, settings=settings, positions=positions, progress=progress)

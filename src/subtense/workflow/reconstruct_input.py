@@ -119,6 +119,34 @@ class Positions:
     frame: str
 
 
+TAGS = "tags"
+"""Instead of a table: the positions in the pictures' own files, read because a person asks for them by this name."""
+
+
+def positions_told(told: Path, photos: Mapping[str, Path]) -> Positions:
+    """Of each picture its position, from a table or, where `told` is TAGS, from the pictures' own files.
+
+    Raises:
+        FileFormatError: a table that can't be read.
+        InputError: fewer than three files tell a position.
+    """
+    if str(told) != TAGS:
+        return read_positions(told)
+    from ..private_tags import position_of
+
+    unknown = np.full(3, math.nan)
+    found = {
+        name: (np.array(place), unknown) for name, path in photos.items() if (place := position_of(path)) is not None
+    }
+    if len(found) < 3:
+        raise InputError(
+            "--positions",
+            TAGS,
+            f"{len(found)} of {len(photos)} pictures tell a position; give a table of three or more",
+        )
+    return _geographic(found)
+
+
 def read_positions(path: Path) -> Positions:
     """Of each picture its position and its standard deviations, m, from a table `name,x,y,z[,u][,u_z]`, or `name,lat,lon,alt[,u][,u_z]`.
 
@@ -147,9 +175,13 @@ def read_positions(path: Path) -> Positions:
         u = values[3] if len(values) > 3 else math.nan
         found[row[0].strip()] = (values[:3], np.array([u, u, values[4] if len(values) > 4 else u]))
     if geographic and found:
-        first = next(iter(found.values()))[0]
-        return Positions(_in_metres(found), geojson.FRAME + ",".join(f"{x:.9f}" for x in first))
+        return _geographic(found)
     return Positions(found, f"the positions of {path.name}")
+
+
+def _geographic(found: Mapping[str, tuple[Array, Array]]) -> Positions:
+    first = next(iter(found.values()))[0]
+    return Positions(_in_metres(found), geojson.FRAME + ",".join(f"{x:.9f}" for x in first))
 
 
 def _in_metres(found: Mapping[str, tuple[Array, Array]]) -> dict[str, tuple[Array, Array]]:

@@ -27,7 +27,7 @@ from .reconstruct_input import (
     known_lengths,
     known_positions,
     measured_ends,
-    read_positions,
+    positions_told,
 )
 from .triangulate import measured
 
@@ -80,7 +80,7 @@ def metric(scene: Scene, photos: Mapping[str, Path], asked: Asked) -> Scaled:
     placed, frame = None, ""
     doubts: tuple[Note, ...] = ()
     if asked.positions is not None:
-        told = read_positions(asked.positions)
+        told = positions_told(asked.positions, photos)
         placed, frame = known_positions(told, asked.accuracy, scene), told.frame
         placed, doubts = _widened(scene, placed)
         known.append(placed)
