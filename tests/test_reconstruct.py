@@ -22,6 +22,7 @@ from subtense.scale import Known, scaled
 from subtense.scene_files import colmap, geojson, las, opensfm, ply
 from subtense.views import Views
 from subtense.workflow.reconstruct import opened_scene, pictures_in, reconstructed
+from subtense.workflow.reconstruct_board import read_board
 from subtense.workflow.reconstruct_input import read_positions
 from subtense.workflow.reconstruct_measure import Asked, measurements, metric
 from subtense.workflow.reconstruct_rig import read_pairs, rig_of, write_pairs
@@ -118,6 +119,32 @@ def test_a_wrong_size_is_seen_by_the_others(scene, photos):
     assert done.relative_u > 3 * scaled(scene, [known(0, 3), known(1, 4)]).relative_u
     checked = scaled(scene, [known(0, 3), dataclasses.replace(wrong, check=True)])
     assert [n.code for n in checked.notes] == ["check_failed"]
+
+
+def test_a_board_gives_the_scale(scene, tmp_path):
+    """The same places, with a ChArUco board of 10 cm squares on the back wall."""
+    import cv2
+
+    board = cv2.aruco.CharucoBoard((9, 7), 0.1, 0.075, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100))
+    drawn, rng = room.planes(), np.random.default_rng(8)
+    size = (9 * room.PX_PER_M // 10, 7 * room.PX_PER_M // 10)
+    drawn[0][1][240 : 240 + size[1] + 60, 270 : 270 + size[0] + 60] = 240
+    drawn[0][1][270 : 270 + size[1], 300 : 300 + size[0]] = board.generateImage(size)
+    files = {}
+    for i, name in enumerate(NAMES):
+        cv2.imwrite(str(tmp_path / name), room.render(ROTATION[i], CENTRE[i], drawn, rng))
+        files[name] = tmp_path / name
+    asked = Asked(board=read_board("charuco, 9x7, 100 ± 0.2 mm, 75 mm, 5x5_100"),
+                  checks=(f"0.png -> 3.png = {apart(0, 3)} m ± 0.1 mm",))  # fmt: skip
+    done = metric(scene, files, asked)
+    [shape, check] = done.said
+    assert shape.kind == "shape" and done.relative_u < 0.004
+    assert abs(check.found_m - check.length_m) < 2.6 * check.u_m
+    with pytest.raises(NothingFoundError, match="two pictures"):
+        metric(scene, files, Asked(board=read_board("charuco, 8x6, 25 mm, 18 mm, 4x4_50")))
+    for text in ("charuco", "charuco, 8x6, 25 mm", "wall, 8x6, 25 mm", "chessboard, 0x0, 25 mm"):
+        with pytest.raises(InputError):
+            read_board(text)
 
 
 def test_one_tape_errs_once(scene):

@@ -93,6 +93,11 @@ def _working() -> Iterator[Callable[[str, float], None]]:
     "--things", "targets", is_flag=True, help="Scale by sheets, cards and codes of known size, which are found."
 )
 @click.option(
+    "--board",
+    metavar="BOARD",
+    help="Scale by a calibration board, which is found: 'charuco, 8x6, 25 mm, 18 mm, 4x4_50'.",
+)
+@click.option(
     "--baseline",
     metavar="PAIRS",
     help="Scale by a stereo rig, as 'left, right = 120 mm': how the pictures' names begin.",
@@ -130,7 +135,7 @@ def reconstruct(folder: Path, measures: tuple[str, ...], camera: str | None, mat
     """A scene from the pictures in FOLDER, in metres by what is known of its size, and lengths in it with their uncertainty.
 
     FOLDER may also hold a scene of COLMAP, OpenSfM or OpenDroneMap. Pictures alone have no scale: without one of --distance,
-    --marker-size, --things, --baseline, --camera-height or --positions there are no metres, and nothing is measured.
+    --marker-size, --things, --board, --baseline, --camera-height or --positions there are no metres, and nothing is measured.
     """
     from ..workflow.reconstruct_command import Run, run
 

@@ -18,6 +18,7 @@ from ..reports import text as text_report
 from ..scale import Scaled
 from ..scene import WHAT_TO_GIVE, Scene
 from .reconstruct import opened_scene, photos_of, pictures_in, reconstructed
+from .reconstruct_board import read_board
 from .reconstruct_input import positions_told
 from .reconstruct_measure import Asked, measurements, metric
 from .reconstruct_output import check_outputs, scene_json, write
@@ -42,7 +43,7 @@ class Run:
         seed: of the draws.
         pairs: of pictures, to be written as rigs.
         unscaled: whether a scene without a scale is wanted.
-        known: what tells the scale: distances, checks, marker_size, targets, baseline, heights, positions, accuracy.
+        known: what tells the scale: distances, checks, marker_size, targets, board, baseline, heights, positions, accuracy.
     """
 
     folder: Path
@@ -99,7 +100,8 @@ def _known(asked: Run) -> Asked:
     size = told.pop("marker_size")
     if size is not None:
         size = Quantity.parse(size, "m", bare="mm", name="--marker-size", assume=assumptions.size)
-    known = Asked(**told, marker_size=size, measures=asked.measures)
+    board = told.pop("board", None)
+    known = Asked(**told, marker_size=size, board=None if board is None else read_board(board), measures=asked.measures)
     check_outputs(asked.outputs)
     if not known.scale and not asked.unscaled:
         raise InputError("scale", None, f"{WHAT_TO_GIVE}; or --unscaled for a scene in a unit of its own")

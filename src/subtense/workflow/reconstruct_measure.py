@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..board import Board
 from ..detection import Search
 from ..document import Document
 from ..errors import InputError, NothingFoundError, SubtenseError
@@ -21,6 +22,7 @@ from ..views import Track, Views
 from .correspond import Finder
 from .detect import detect, size_of
 from .improve import improved
+from .reconstruct_board import known_board
 from .reconstruct_input import (
     known_baselines,
     known_heights,
@@ -45,6 +47,7 @@ class Asked:
         accuracy: of its rows that state none.
         marker_size: side of markers, to be found by themselves.
         targets: whether sheets, cards and codes of known size are looked for.
+        board: a calibration board that is looked for.
         measures: `END` or `END -> END`.
     """
 
@@ -56,13 +59,20 @@ class Asked:
     accuracy: str | None = None
     marker_size: Quantity | None = None
     targets: bool = False
+    board: Board | None = None
     measures: Sequence[str] = ()
 
     @property
     def scale(self) -> bool:
         """Whether anything tells a scale."""
         return bool(
-            self.distances or self.baseline or self.heights or self.positions or self.marker_size or self.targets
+            self.distances
+            or self.baseline
+            or self.heights
+            or self.positions
+            or self.marker_size
+            or self.targets
+            or self.board
         )
 
 
@@ -86,6 +96,8 @@ def metric(scene: Scene, photos: Mapping[str, Path], asked: Asked) -> Scaled:
         known.append(placed)
     if asked.marker_size is not None or asked.targets:
         known += known_things(scene, views, photos, asked)
+    if asked.board is not None:
+        known.append(known_board(scene, photos, asked.board))
     known += known_lengths(asked.checks, views, finder.found, check=True)
     doubts = (*doubts, *finder.notes)
     done = scaled(replace(scene, notes=(*scene.notes, *doubts)), known)
