@@ -79,6 +79,16 @@ def lengths(views):
     return found, np.array([apart(a, b) for a, b in pairs]), slopes
 
 
+def test_global_mapping_of_pictures_matched_by_position(folder):
+    places = {name: (float(x), float(y), float(z)) for name, (x, y, z) in zip(NAMES, CENTRE, strict=True)}
+    settings = Settings("position", "global", 1000)
+    found = reconstructed(pictures_in(folder), camera="f=600 ± 6 px", settings=settings, positions=places)
+    done = scaled(found, [known(0, 3)])
+    assert sorted(done.scene.names) == sorted(NAMES)
+    at = dict(zip(done.scene.names, done.scene.centre, strict=True))
+    assert np.linalg.norm(at["1.png"] - at["4.png"]) == pytest.approx(apart(1, 4), rel=0.005)
+
+
 def test_distances_hold_with_their_whole_covariance(scene):
     done = scaled(scene, [known(0, 3)])
     views = done.scene.views()
