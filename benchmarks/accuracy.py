@@ -26,6 +26,7 @@ import planes  # noqa: E402
 import scenes  # noqa: E402
 import sheets  # noqa: E402
 import stereo_accuracy  # noqa: E402
+import test_apriltag_library as tags  # noqa: E402
 import test_coverage as coverage  # noqa: E402
 import test_real_pictures as real  # noqa: E402
 import test_rim_coverage as rims  # noqa: E402
@@ -242,6 +243,15 @@ def put(name: str, rows: list[Row]) -> None:
     PAGE.write_text(re.sub(rf"<!-- {name} -->.*?<!-- end -->", lambda _: block, text, flags=re.DOTALL))
 
 
+def families() -> list[Row]:
+    """A drawn tag of each family that has data outside its border."""
+    rows = [("family", "read as", "largest error of a corner")]
+    for family in tags.FAMILIES:
+        found, error = tags.located(family)
+        rows.append((family, found.label, f"{float(np.abs(error).max()):.3f} px"))
+    return rows
+
+
 def april_vision_in_a_folder() -> list[Row]:
     """`april_vision` with a folder for its camera file."""
     import tempfile
@@ -253,6 +263,7 @@ def april_vision_in_a_folder() -> list[Row]:
 TABLES: dict[str, Callable[[], list[Row]]] = {
     "examples": examples, "frc2019": frc_2019, "focal": focal_lengths, "april_vision": april_vision_in_a_folder,
     "calibration_real": calibration_real, "frc2024": frc_2024, "planes_real": planes.pictures, "ground_real": ground.pictures,
+    "families": families,
     "markers": markers.rows, "marker_bias": markers.bias_rows, "circles": circles.rows, "circles_rendered": circles.rendered,
     "sheets": sheets.rows, "sheets_rendered": sheets.rendered, "simulated": simulated, "planes": planes.simulated,
     "gross_clicks": planes.gross_clicks, "line_cameras": planes.cameras, "ground": ground.simulated, "together": together.rows,

@@ -423,6 +423,23 @@ def _input(name: str, value: Any, camera: Mapping[str, Any] | None) -> list[str]
             camera.get(key) == value[key] for key in ("f_px", "cov", "source") if key in value
         )
         return [shown, *_camera_input(value), "see Camera" if same else source]
+    if "right_from_left" in value:
+        return [shown, *_rig(value), source]
+    if "centre_m" in value:
+        u_m = [
+            math.sqrt(max(value["cov"][6 * i + k][6 * i + k], 0.0))
+            for i in range(len(value["names"]))
+            for k in (3, 4, 5)
+        ]
+        return [
+            shown,
+            f"{len(value['names'])} pictures: {', '.join(value['names'])}",
+            f"places to {_shown(max(u_m), 'm', max(u_m))}",
+            source,
+        ]
+    if "seen" in value:
+        places, u = _points(value["seen"])
+        return [shown, f"in {', '.join(value['names'])}: {places}", u, str(value["seen"].get("source", ""))]
     if "value" in value and not isinstance(value["value"], (list, Mapping)):
         return [shown, *_quantity(value)]
     return [shown, ", ".join(f"{key} {part}" for key, part in value.items()), "", ""]
@@ -481,6 +498,20 @@ def _camera_input(value: Mapping[str, Any]) -> tuple[str, str]:
         return f"{len(value['f_px'])} cameras", ""
     u_px = math.sqrt(max(value["cov"][0][0], 0.0)) if value.get("cov") else 0.0
     return f"f{_NO_BREAK}{_shown(value['f_px'], 'px', u_px)}", _shown(u_px, "px", u_px) if u_px else "exact"
+
+
+def _rig(value: Mapping[str, Any]) -> tuple[str, str]:
+    """Focal lengths and baseline of two cameras, and the u of the baseline."""
+    along = value["right_from_left"]["translation_m"]
+    baseline_m = math.hypot(*along)
+    block = [row[-3:] for row in value["cov"][-3:]]
+    variance = sum(a * c * b for a, row in zip(along, block, strict=True) for c, b in zip(row, along, strict=True))
+    u_m = math.sqrt(max(variance, 0.0)) / baseline_m if baseline_m else 0.0
+    f = " and ".join(_shown(value[side]["f_px"], "px", None) for side in ("left", "right"))
+    return (
+        f"two cameras, f {f}, baseline {_shown(baseline_m, 'm', u_m or None)}",
+        f"{_shown(u_m, 'm', u_m)} of the baseline",
+    )
 
 
 # -- paper -------------------------------------------------------------------------------------------

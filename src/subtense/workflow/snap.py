@@ -28,7 +28,7 @@ APART_PX = 2.0
 
 
 def snapped(
-    photo: Photo, observation: Observation, curve: Quantity, *, radius_px: float | None = None
+    photo: Photo, observation: Observation, curve: Quantity, *, radius_px: float | None = None, unseen: bool = False
 ) -> tuple[Observation, tuple[Note, ...]]:
     """Marked points at the edges and corners near them, and notes on how far they moved and what else is near.
 
@@ -40,6 +40,7 @@ def snapped(
         observation: the points as marked.
         curve: exponent of the transfer curve.
         radius_px: how far from a point; None for the default of `edges`.
+        unseen: whether nobody sees where the points went before they are measured with: those that went far are then doubted.
 
     Returns:
         The points with their joint covariance; a curve that is unknown moves all of them out or in together.
@@ -59,7 +60,7 @@ def snapped(
     for i, (_, own, _) in enumerate(ends):
         cov[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += own
     far = np.hypot(*(points - marked).T)
-    cov, doubts = _moved_far(cov, points - marked, observation)
+    cov, doubts = _moved_far(cov, points - marked, observation) if unseen else (cov, [])
     text = f"the marked points were moved to edges near them, by {', '.join(f'{px:.1f}' for px in far)} px"
     found = Observation(points, cov=cov, label=observation.label, source="edges near the marked points")
     return found, (Note("snapped", text, "look at the overlay"), *doubts, *notes)
@@ -87,7 +88,7 @@ def snapped_lines(
     photo: Photo, lines: Sequence[Observation], curve: Quantity
 ) -> tuple[list[Observation], list[tuple[Note, ...]]]:
     """Each line snapped, and the notes of each; see `snapped`."""
-    pairs = [snapped(photo, line, curve) for line in lines]
+    pairs = [snapped(photo, line, curve, unseen=True) for line in lines]
     return [line for line, _ in pairs], [notes for _, notes in pairs]
 
 
