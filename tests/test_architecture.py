@@ -22,6 +22,7 @@ HEAVY = {
     "lensfunpy",
     "pycolmap",
     "pyapriltags",
+    "laspy",
     "rasterio",
     "ai_edge_litert",
     "onnxruntime",

@@ -1,9 +1,11 @@
 """Scenes from pictures by themselves: truth by rendered pictures, scales of all kinds, refusals, and files."""
 
 import dataclasses
+import io
 import itertools
 import json
 import struct
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,7 @@ from tests import scene_pictures as room
 
 from subtense.camera import Camera
 from subtense.cli import main
-from subtense.errors import FileFormatError, GeometryError, InputError, NothingFoundError
+from subtense.errors import FileFormatError, GeometryError, InputError, MissingExtraError, NothingFoundError
 from subtense.methods.reconstruction import Settings, colmap_camera
 from subtense.quantity import Quantity
 from subtense.scale import Known, scaled
@@ -354,6 +356,22 @@ def test_ply_and_las(scene):
     (step,) = struct.unpack_from("<d", data, 131)
     assert data[:4] == b"LASF" and count == len(done.points) and len(data) == 227 + 26 * count
     assert np.frombuffer(data[227:239], "<i4") * step == pytest.approx(done.points[0], abs=1e-4)
+
+
+def test_laz_is_the_same_compressed(scene):
+    laspy = pytest.importorskip("laspy")
+    pytest.importorskip("lazrs")
+    done = scaled(scene, [known(0, 3)]).scene
+    plain, packed = las.write(done), las.write_compressed(done)
+    assert len(packed) < 0.7 * len(plain)
+    one, other = (laspy.read(io.BytesIO(content)) for content in (plain, packed))
+    assert one.xyz == pytest.approx(other.xyz, abs=1e-9) and np.array_equal(one.red, other.red)
+
+
+def test_without_laspy_laz_says_what_to_install(scene, monkeypatch):
+    monkeypatch.setitem(sys.modules, "laspy", None)
+    with pytest.raises(MissingExtraError, match="laz"):
+        las.write_compressed(scaled(scene, [known(0, 3)]).scene)
 
 
 def test_cameras_for_colmap():

@@ -55,7 +55,7 @@ WRITTEN = (
     click.option("--depth-map", type=click.Path(path_type=Path), help="Write the depths: .png (mm), .pfm or .npy (m)."),
     click.option("--sigma-map", type=click.Path(path_type=Path), help="Write their standard deviations likewise."),
     click.option("--depth-picture", type=click.Path(path_type=Path), help="Write the depths as a picture in colours."),
-    click.option("--cloud", type=click.Path(path_type=Path), help="Write points in colour: .ply or .las."),
+    click.option("--cloud", type=click.Path(path_type=Path), help="Write points in colour: .ply, .las or .laz."),
 )
 """Files of the map."""
 

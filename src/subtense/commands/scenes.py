@@ -123,7 +123,7 @@ def _working() -> Iterator[Callable[[str, float], None]]:
     "--photos", type=click.Path(path_type=Path), metavar="FOLDER", help="Where the pictures of an existing scene are."
 )
 @click.option("-o", "--output", "outputs", multiple=True, type=click.Path(path_type=Path),
-              help="Write the scene: .ply, .las, .geojson, .json, or a folder for COLMAP's files.")  # fmt: skip
+              help="Write the scene: .ply, .las, .laz, .geojson, .json, or a folder for COLMAP's files.")  # fmt: skip
 @click.option("--pair", "pairs", multiple=True, metavar="RIG",
               help="Write two pictures as a rig, for `subtense stereo`: 'a.jpg, b.jpg = rig.json'.")  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["text", "json"]), default="text", show_default=True)

@@ -13,7 +13,7 @@ FILES = (
     ("depth-map", "Depths: .png (16 bit, mm), .pfm, .npy (m)."),
     ("sigma-map", "Their standard deviations, in the same formats."),
     ("depth-picture", "Depths in colour, with a scale: .png or .jpg."),
-    ("cloud", "Points of the left picture's matched pixels: .ply or .las."),
+    ("cloud", "Points of the left picture's matched pixels: .ply, .las or .laz."),
     ("error-plot", "Standard deviation against depth: .csv, or .png with the extra `plots`."),
 )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,14 @@ import numpy as np
 from ..arrays import Array, Pixels
 from ..depth_map import DepthMap
 from ..errors import InputError, MissingExtraError
+from ..las import las, laz
 from ..whole_file import write_whole
 
 ENDINGS = {
     "--depth-map": (".png", ".pfm", ".npy"),
     "--sigma-map": (".png", ".pfm", ".npy"),
     "--depth-picture": (".png", ".jpg", ".jpeg"),
-    "--cloud": (".ply", ".las"),
+    "--cloud": (".ply", ".las", ".laz"),
     "--error-plot": (".csv", ".png"),
 }
 NOTHING_RGB, FILLED_WEIGHT = (38, 38, 42), 0.55
@@ -156,15 +156,21 @@ def _round_depths(near: float, far: float) -> list[float]:
 
 def write_cloud(made: DepthMap, pixels: Pixels, path: Path, option: str) -> None:
     """Points that were seen, not filled ones, with colour; in PLY also the standard deviation of each depth, m. Camera axes: x right,
-    y down, z forward; LAS, which geographers read, has z up: (x, z, -y)."""
+    y down, z forward; LAS and LAZ, which geographers read, has z up: (x, z, -y)."""
     check(path, option)
     kept = made.answered & ~made.filled
     points, colours = made.points_m()[kept], pixels[kept]
     sigma = np.asarray(made.sigma_m[kept], "<f4")
     fine = np.isfinite(points).all(axis=-1)
     points, colours, sigma = points[fine], colours[fine], sigma[fine]
-    content = _ply(points, colours, sigma) if path.suffix.lower() == ".ply" else _las(points, colours)
-    write_whole(path, content, option)
+    write_whole(path, _points(points, colours, sigma, path.suffix.lower()), option)
+
+
+def _points(points: Array, colours: Pixels, sigma: Any, ending: str) -> bytes:
+    if ending == ".ply":
+        return _ply(points, colours, sigma)
+    content = las(np.stack([points[:, 0], points[:, 2], -points[:, 1]], -1), colours)
+    return laz(content) if ending == ".laz" else content
 
 
 def _ply(points: Array, colours: Pixels, sigma: Any) -> bytes:
@@ -177,22 +183,6 @@ def _ply(points: Array, colours: Pixels, sigma: Any) -> bytes:
         "property float sigma", "end_header", "",
     ]  # fmt: skip
     return "\n".join(head).encode() + rows.tobytes()
-
-
-def _las(points: Array, colours: Pixels) -> bytes:
-    """LAS 1.2, point format 2 (ASPRS, LAS specification 1.2): whole tenths of a millimetre, colours of 16 bits."""
-    placed = np.stack([points[:, 0], points[:, 2], -points[:, 1]], -1)
-    step = max(1e-4, float(np.abs(placed).max(initial=0.0)) / (2**31 - 10))
-    whole = np.rint(placed / step).astype("<i4")
-    rows = np.zeros(len(points), [("xyz", "<i4", 3), ("intensity", "<u2"), ("flags", "u1"), ("class", "u1"), ("angle", "i1"),
-                                  ("user", "u1"), ("source", "<u2"), ("rgb", "<u2", 3)])  # fmt: skip
-    rows["xyz"], rows["flags"], rows["rgb"] = whole, 0b00001001, colours.astype(np.uint16) * 257
-    low, high = (whole.min(axis=0) * step, whole.max(axis=0) * step) if len(points) else (np.zeros(3), np.zeros(3))
-    ends = [v for i in range(3) for v in (float(high[i]), float(low[i]))]
-    count = len(points)
-    head = struct.pack("<4sHHIHH8sBB32s32sHHHIIBHI5I3d3d6d", b"LASF", 0, 0, 0, 0, 0, b"", 1, 2, b"subtense", b"subtense", 1, 2000, 227,
-                       227, 0, 2, rows.dtype.itemsize, count, count, 0, 0, 0, 0, step, step, step, 0.0, 0.0, 0.0, *ends)  # fmt: skip
-    return head + rows.tobytes()
 
 
 # -- error by depth --------------------------------------------------------------------------------------

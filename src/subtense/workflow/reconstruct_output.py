@@ -14,7 +14,8 @@ from ..scene import Scene
 from ..scene_files import colmap, geojson, las, ply
 
 SCHEMA = "subtense-scene/1"
-WRITERS: dict[str, Callable[[Scene], bytes]] = {".ply": ply.write, ".las": las.write, ".geojson": geojson.write}
+WRITERS: dict[str, Callable[[Scene], bytes]] = {".ply": ply.write, ".las": las.write, ".laz": las.write_compressed,
+                                              ".geojson": geojson.write}  # fmt: skip
 
 
 def check_outputs(paths: Sequence[Path]) -> None:
