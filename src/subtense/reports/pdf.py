@@ -19,7 +19,8 @@ from ..distribution import HALF_WIDTH_95
 from ..document import Document
 from ..errors import MissingExtraError
 from ..quantity import Contribution, Measurement, Note
-from .rounding import digits_for, fitting_unit, grouped, number
+from .inputs import NO_BREAK, input_row, short, typeset, with_doubt
+from .rounding import digits_for, fitting_unit, grouped
 
 PAGE_PT = (595.276, 841.89)
 """A4 portrait."""
@@ -33,7 +34,6 @@ LONGEST = 600
 """Characters of one cell; a row that is higher than a page can't be set."""
 SHORT = 72
 """Characters of a label where it stands beside numbers; it is whole over its section."""
-MOST_POINTS = 8
 
 _TITLES = {
     "size": "real size",
@@ -49,8 +49,7 @@ _MEANINGS = {
     "range": "Range is the distance from the entrance pupil of the lens.",
     "depth": "Depth is the distance along the optical axis.",
 }
-_NO_BREAK = "\u00a0"
-_WRITTEN_AS = {"\u2009": _NO_BREAK, "\u202f": _NO_BREAK, "\u2007": _NO_BREAK, "μ": "µ", "′": "'", "″": '"'}
+_WRITTEN_AS = {"\u2009": NO_BREAK, "\u202f": NO_BREAK, "\u2007": NO_BREAK, "μ": "µ", "′": "'", "″": '"'}
 _FONTS = {"Vera": "Vera.ttf", "VeraBd": "VeraBd.ttf"}
 _STYLES: dict[str, dict[str, Any]] = {
     "title": {"fontName": "VeraBd", "fontSize": 18, "leading": 23, "textColor": ACCENT},
@@ -204,7 +203,7 @@ def _title(m: Measurement) -> str:
 
 
 def _percent(level: float) -> str:
-    return f"{100 * level:.8g}{_NO_BREAK}%"
+    return f"{100 * level:.8g}{NO_BREAK}%"
 
 
 def _doubt(m: Measurement) -> float:
@@ -215,28 +214,14 @@ def _doubt(m: Measurement) -> float:
     return max((abs(m.value - end) for end in ends), default=abs(m.value)) / 2
 
 
-def _typeset(text: str) -> str:
-    """A number with its unit on one line, with a minus sign instead of a hyphen."""
-    return text.replace("-", "−").replace(" ", _NO_BREAK)
-
-
-def _shown(value: float, unit: str, doubt: float | None) -> str:
-    """A number to two digits of its doubt; a value of 0 takes the doubt's unit."""
-    return _typeset(number(value, unit, doubt, reference=value or doubt or 1.0))
-
-
 def _value(m: Measurement) -> str:
-    return _shown(m.value, m.unit, _doubt(m))
+    return with_doubt(m.value, m.unit, _doubt(m))
 
 
 def _u(m: Measurement) -> str:
     if m.u is None:
         return "none"
-    return "0" if m.u == 0 else _short(m.u, m.unit, m.value)
-
-
-def _short(u: float, unit: str, reference: float) -> str:
-    return _typeset(number(abs(u), unit, abs(u), reference=reference or u))
+    return "0" if m.u == 0 else short(m.u, m.unit, m.value)
 
 
 def _interval(m: Measurement) -> str:
@@ -248,12 +233,12 @@ def _interval(m: Measurement) -> str:
     name, factor = fitting_unit(m.value or _doubt(m), m.unit)
     decimals = max(digits_for(_doubt(m) / factor), 0)
     unit = name if name == "°" else f" {name}"
-    low, high = (None if x is None else _typeset(grouped(x / factor, decimals)) for x in (m.low, m.high))
+    low, high = (None if x is None else typeset(grouped(x / factor, decimals)) for x in (m.low, m.high))
     if high is None:
-        return f"from {low}{_typeset(unit)}, upper limit open"
+        return f"from {low}{typeset(unit)}, upper limit open"
     if low is None:
-        return f"up to {high}{_typeset(unit)}, lower limit open"
-    return f"{low} to {high}{_typeset(unit)}".strip(_NO_BREAK)
+        return f"up to {high}{typeset(unit)}, lower limit open"
+    return f"{low} to {high}{typeset(unit)}".strip(NO_BREAK)
 
 
 # -- the picture -------------------------------------------------------------------------------------
@@ -309,11 +294,11 @@ def _camera(camera: Mapping[str, Any]) -> Iterator[Any]:
 
 def _focal(f_px: float, u_px: float | None) -> str:
     if not u_px:
-        return f"{_shown(f_px, 'px', None)}, taken as exact"
+        return f"{with_doubt(f_px, 'px', None)}, taken as exact"
     half_px = HALF_WIDTH_95 * u_px
     decimals = max(digits_for(u_px), 0)
-    low, high = (_typeset(grouped(end_px, decimals)) for end_px in (f_px - half_px, f_px + half_px))
-    return f"{_shown(f_px, 'px', u_px)}, {_percent(0.95)}: {low} to {high}{_NO_BREAK}px (u{_NO_BREAK}{_shown(u_px, 'px', u_px)})"
+    low, high = (typeset(grouped(end_px, decimals)) for end_px in (f_px - half_px, f_px + half_px))
+    return f"{with_doubt(f_px, 'px', u_px)}, {_percent(0.95)}: {low} to {high}{NO_BREAK}px (u{NO_BREAK}{with_doubt(u_px, 'px', u_px)})"
 
 
 # -- one thing that was measured ---------------------------------------------------------------------
@@ -331,7 +316,7 @@ def _section(
     yield _terms(list(_method_rows(group, assumes)))
     if head.given:
         yield _paragraph("Inputs", "part")
-        inputs = [_input(name, value, camera) for name, value in head.given.items()]
+        inputs = [input_row(name, value, camera) for name, value in head.given.items()]
         yield _table([["input", "value", "u", "law, source"], *inputs], (28.0, 62.0, 27.0, 53.0), right=(2,))
     if head.budget:
         yield _paragraph(f"Uncertainty budget of the {_title(head)}", "part")
@@ -373,18 +358,18 @@ def _budget(m: Measurement) -> Any:
     strong = []
     if m.u:
         strong.append(len(rows))
-        rows.append(["combined", "", "", _typeset("100 %"), _short(m.u, m.unit, m.value)])
+        rows.append(["combined", "", "", typeset("100 %"), short(m.u, m.unit, m.value)])
     return _table(rows, (42.0, 59.0, 32.0, 15.0, 22.0), right=(3, 4), strong=strong)
 
 
 def _part_of(m: Measurement, c: Contribution) -> str:
     """The u of a contribution; what is lost in the sum is told as a limit."""
     least = math.hypot(*(other.u for other in m.budget)) / 1000
-    return _short(c.u, m.unit, m.value) if abs(c.u) >= least else f"<{_short(least, m.unit, m.value)}"
+    return short(c.u, m.unit, m.value) if abs(c.u) >= least else f"<{short(least, m.unit, m.value)}"
 
 
 def _share(c: Contribution) -> str:
-    return _typeset(f"{100 * c.share:.0f} %" if c.share >= 0.005 else "<1 %")
+    return typeset(f"{100 * c.share:.0f} %" if c.share >= 0.005 else "<1 %")
 
 
 def _bar(c: Contribution) -> Any:
@@ -399,119 +384,6 @@ def _bar(c: Contribution) -> Any:
         bar.fillColor, bar.strokeColor = HexColor(colour), None
         drawing.add(bar)
     return drawing
-
-
-# -- inputs, as their JSON has them ------------------------------------------------------------------
-
-
-def _input(name: str, value: Any, camera: Mapping[str, Any] | None) -> list[str]:
-    """Name, value, u, and law with source of one input, whichever noun it is."""
-    shown = name.replace("_", " ")
-    if value is None:
-        return [shown, "not given", "", ""]
-    if not isinstance(value, Mapping):
-        return [shown, str(value), "", ""]
-    source = str(value.get("source", ""))
-    if "$ref" in value:
-        return [shown, f"the same as {str(value['$ref']).rpartition('/')[2].replace('_', ' ')}", "", ""]
-    if "points_px" in value:
-        return [shown, *_points(value), source]
-    if "points_m" in value:
-        return [shown, *_target(value), source]
-    if "f_px" in value:
-        same = camera is not None and all(
-            camera.get(key) == value[key] for key in ("f_px", "cov", "source") if key in value
-        )
-        return [shown, *_camera_input(value), "see Camera" if same else source]
-    if "right_from_left" in value:
-        return [shown, *_rig(value), source]
-    if "centre_m" in value:
-        u_m = [
-            math.sqrt(max(value["cov"][6 * i + k][6 * i + k], 0.0))
-            for i in range(len(value["names"]))
-            for k in (3, 4, 5)
-        ]
-        return [
-            shown,
-            f"{len(value['names'])} pictures: {', '.join(value['names'])}",
-            f"places to {_shown(max(u_m), 'm', max(u_m))}",
-            source,
-        ]
-    if "seen" in value:
-        places, u = _points(value["seen"])
-        return [shown, f"in {', '.join(value['names'])}: {places}", u, str(value["seen"].get("source", ""))]
-    if "value" in value and not isinstance(value["value"], (list, Mapping)):
-        return [shown, *_quantity(value)]
-    return [shown, ", ".join(f"{key} {part}" for key, part in value.items()), "", ""]
-
-
-def _quantity(value: Mapping[str, Any]) -> tuple[str, str, str]:
-    number_, u, unit = float(value["value"]), value.get("u") or 0.0, str(value.get("unit", "1"))
-    shown = _shown(number_, unit, u)
-    law = value.get("distribution", "normal")
-    law = str(law if isinstance(law, str) else law["name"]).replace("_", " ")
-    dof = f", {value['dof']:g} degrees of freedom" if "dof" in value else ""
-    source = str(value.get("source", ""))
-    if not u:
-        return shown, "exact", source
-    return shown, _short(u, unit, number_), "; ".join(text for text in (law + dof, source) if text)
-
-
-def _points(value: Mapping[str, Any]) -> tuple[str, str]:
-    """Where the points are, and the smallest and largest u of their coordinates."""
-    points_px = value["points_px"]
-    if value.get("cov"):
-        u_px = [math.sqrt(max(row[i], 0.0)) for i, row in enumerate(value["cov"])]
-    else:
-        u_px = list(_flat(value.get("sigma_px", 0.0)))
-    decimals = min(max(digits_for(min(u_px)), 0), 3)
-    texts = [_typeset(f"({', '.join(grouped(x_px, decimals) for x_px in point)})") for point in points_px[:MOST_POINTS]]
-    more = f" and {len(points_px) - MOST_POINTS} more" if len(points_px) > MOST_POINTS else ""
-    least, most = (_shown(end_px, "px", end_px) for end_px in (min(u_px), max(u_px)))
-    return " ".join(texts) + more + f"{_NO_BREAK}px", most if least == most else f"{least} to {most}"
-
-
-def _percent_of(share: float) -> str:
-    return _typeset(f"{grouped(100 * share, max(digits_for(100 * share), 0))} %")
-
-
-def _flat(value: Any) -> Iterator[float]:
-    if isinstance(value, (list, tuple)):
-        for part in value:
-            yield from _flat(part)
-    else:
-        yield float(value)
-
-
-def _target(value: Mapping[str, Any]) -> tuple[str, str]:
-    """Name, number of points and their span; the u of the scale and of single points."""
-    points_m, u_scale, sigma_m = value["points_m"], value.get("u_scale") or 0.0, value.get("sigma_m") or 0.0
-    spans_m = [max(axis) - min(axis) for axis in zip(*points_m, strict=True)]
-    span = " × ".join(_shown(span_m, "m", (span_m * u_scale) or None) for span_m in spans_m if span_m > 0)
-    doubts = [f"{_percent_of(u_scale)} of its size"] if u_scale else []
-    doubts += [f"{_shown(sigma_m, 'm', sigma_m)} a point"] if sigma_m else []
-    return f"{value.get('name', '')}, {len(points_m)} points, {span}", ", ".join(doubts) or "exact"
-
-
-def _camera_input(value: Mapping[str, Any]) -> tuple[str, str]:
-    if isinstance(value["f_px"], list):
-        return f"{len(value['f_px'])} cameras", ""
-    u_px = math.sqrt(max(value["cov"][0][0], 0.0)) if value.get("cov") else 0.0
-    return f"f{_NO_BREAK}{_shown(value['f_px'], 'px', u_px)}", _shown(u_px, "px", u_px) if u_px else "exact"
-
-
-def _rig(value: Mapping[str, Any]) -> tuple[str, str]:
-    """Focal lengths and baseline of two cameras, and the u of the baseline."""
-    along = value["right_from_left"]["translation_m"]
-    baseline_m = math.hypot(*along)
-    block = [row[-3:] for row in value["cov"][-3:]]
-    variance = sum(a * c * b for a, row in zip(along, block, strict=True) for c, b in zip(row, along, strict=True))
-    u_m = math.sqrt(max(variance, 0.0)) / baseline_m if baseline_m else 0.0
-    f = " and ".join(_shown(value[side]["f_px"], "px", None) for side in ("left", "right"))
-    return (
-        f"two cameras, f {f}, baseline {_shown(baseline_m, 'm', u_m or None)}",
-        f"{_shown(u_m, 'm', u_m)} of the baseline",
-    )
 
 
 # -- paper -------------------------------------------------------------------------------------------
@@ -607,11 +479,11 @@ def _clean(text: str, most: int | None = None) -> str:
     composed = unicodedata.normalize("NFC", text)
     if most is not None:
         composed = _shortened(composed, most)
-    composed = composed.replace(" %", f"{_NO_BREAK}%")
+    composed = composed.replace(" %", f"{NO_BREAK}%")
     known = _fonts()
     written = (_WRITTEN_AS.get(c, c) for c in composed)
     return "".join(
-        c if c == _NO_BREAK else " " if c.isspace() else c if ord(c) in known and c.isprintable() else "?"
+        c if c == NO_BREAK else " " if c.isspace() else c if ord(c) in known and c.isprintable() else "?"
         for c in written
     )
 
