@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 
+import click
 import pytest
 from click.testing import CliRunner
 from PIL import Image
@@ -182,3 +183,13 @@ def test_inputs_that_are_no_nouns_are_one_line(tmp_path, content):
     path.write_text(content)
     result = run("method", "known_size", "--inputs", path)
     assert result.exit_code == 2 and result.stderr.count("\n") == 1
+
+
+def test_commands_that_are_loaded_later_say_in_the_list_what_they_say_themselves():
+    from subtense.cli import _ELSEWHERE
+
+    context = click.Context(main)
+    listed = CliRunner().invoke(main, ["--help"]).output
+    for name, (_, text) in _ELSEWHERE.items():
+        assert main.get_command(context, name).get_short_help_str(1000) == text
+        assert f"  {name} " in listed

@@ -28,18 +28,22 @@ if TYPE_CHECKING:
 
 
 _ELSEWHERE = {
-    "depth": "depth",
-    "depth-models": "depth",
-    "ground": "ground",
-    "fuse": "together",
-    "methods": "together",
-    "plan": "plan",
-    "reconstruct": "scenes",
-    "triangulate": "scenes",
-    "plane": "plane",
-    "stereo": "stereo",
-}
-"""Commands by the module of `commands` that has them; it is loaded when one of them is asked for."""
+    "depth": ("depth", "Distances in PHOTO by a depth map: of a network that you fetched, or one made elsewhere, as by a depth camera."),
+    "depth-models": ("depth", "Networks of depth: what each gives, how far off it was where that was published, its licence, and how to "
+                     "have it."),
+    "fuse": ("together", "One number from several measurements of the same thing, each in a JSON file that --format json wrote."),
+    "ground": ("ground", "Distances, lengths and speeds on the ground of PHOTO, by the camera's height above it and how it looks down."),
+    "methods": ("together", "Which methods can answer with what is known: FACTS are names of inputs, as camera, ends, size, foot, height."),
+    "plan": ("plan", "Which set-up measures a distance as well as is wanted, and how well a given set-up does."),
+    "plane": ("plane", "Lengths, areas and angles in a plane of PHOTO, by what holds in it: right angles, parallels, equal and known "
+              "lengths."),
+    "reconstruct": ("scenes", "A scene from the pictures in FOLDER, in metres by what is known of its size, and lengths in it with their "
+                    "uncertainty."),
+    "stereo": ("stereo", "Distances from LEFT and RIGHT, two pictures of a rig: of pixels, of boxes, between pixels, and of every pixel."),
+    "triangulate": ("scenes", "Points seen in two or more PHOTOS of one camera that was moved by a known length without turning it, or "
+                    "from known places."),
+}  # fmt: skip
+"""Commands by the module of `commands` that has them, which is loaded when one of them is asked for, and what the list of commands says."""
 
 
 class _Group(click.Group):
@@ -54,9 +58,23 @@ class _Group(click.Group):
         from importlib import import_module
 
         found: click.Command = getattr(
-            import_module(f".commands.{_ELSEWHERE[cmd_name]}", __package__), cmd_name.replace("-", "_")
+            import_module(f".commands.{_ELSEWHERE[cmd_name][0]}", __package__), cmd_name.replace("-", "_")
         )
         return found
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of commands, without loading those that stand elsewhere."""
+        names = self.list_commands(ctx)
+        width = formatter.width - 6 - max(map(len, names))
+        rows = []
+        for name in names:
+            command = (
+                click.Command(name, help=_ELSEWHERE[name][1]) if name in _ELSEWHERE else super().get_command(ctx, name)
+            )
+            if command is not None and not command.hidden:
+                rows.append((name, command.get_short_help_str(width)))
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
