@@ -264,6 +264,7 @@ TABLES: dict[str, Callable[[], list[Row]]] = {
     "examples": examples, "frc2019": frc_2019, "focal": focal_lengths, "april_vision": april_vision_in_a_folder,
     "calibration_real": calibration_real, "frc2024": frc_2024, "planes_real": planes.pictures, "ground_real": ground.pictures,
     "families": families,
+    "marker_cov": markers.covariance_rows,
     "markers": markers.rows, "marker_bias": markers.bias_rows, "circles": circles.rows, "circles_rendered": circles.rendered,
     "sheets": sheets.rows, "sheets_rendered": sheets.rendered, "simulated": simulated, "planes": planes.simulated,
     "gross_clicks": planes.gross_clicks, "line_cameras": planes.cameras, "ground": ground.simulated, "together": together.rows,

@@ -18,6 +18,7 @@ import numpy as np
 from subtense.detection import Search, parse_curve
 from subtense.detectors.markers import markers
 from subtense.marker_codes import cells_of
+from subtense.pattern import FLOOR_PX, floor_cov
 from subtense.photo import Metadata, Photo
 
 SIDES_PX = (12, 16, 20, 30, 60, 120, 200)
@@ -180,6 +181,27 @@ def rows(repeats: int = 4) -> list[tuple[str, ...]]:
         found = compared(grid(side), repeats, curve="srgb")
         ours = np.array(found["subtense"].normalised or [np.nan])
         table.append((f"{side} px", *(_cell(found[name]) for name in names), f"{np.mean(ours):.2f}"))
+    return table
+
+
+def covariance_rows(repeats: int = 6) -> list[tuple[str, ...]]:
+    """Mean squared error over what the covariance says it should be: of the fit alone, and with the floor for real pictures."""
+    table: list[tuple[str, ...]] = [("side", "corners", "by the fit alone", "as stated, with the floor")]
+    search = Search(curve=parse_curve("srgb"))
+    for side in SIDES_PX:
+        alone, stated = [], []
+        for case, k in itertools.product(grid(side), range(repeats)):
+            rng = np.random.default_rng([int(10 * v) for v in case] + [k])
+            gray, true = drawn(case, number := int(rng.integers(587)), rng, "light")
+            ours = next((d.seen for d in markers(photo_of(gray), search) if d.label == f"36h11 id {number}"), None)
+            error = misplaced(None if ours is None else ours.points_px, true)
+            if ours is None or error is None:
+                continue
+            floor = floor_cov(ours.points_px / (perimeter(ours.points_px) / 8), FLOOR_PX)
+            for kept, cov in ((alone, ours.cov - floor), (stated, ours.cov)):
+                kept.append(float(error.ravel() @ np.linalg.solve(cov, error.ravel())) / 8)
+        table.append((f"{side} px", f"{4 * len(alone)}", f"{np.mean(alone):.2f}", f"{np.mean(stated):.2f}"))
+        print(*table[-1], sep=" | ", flush=True)
     return table
 
 

@@ -437,11 +437,20 @@ def _fitted(patch: _Patch, x: Array, cov: Array, sigma: float, floor_px: float) 
         if other is None:
             return None
         jac[:, i] = (other - corners).ravel() / step
-    outward = (corners - corners.mean(axis=0)).ravel()  # in units of half a side
-    floor = (np.eye(8) + np.outer(outward, outward)) * floor_px**2
-    own = jac @ cov[:count, :count] @ jac.T * patch.unit_px**2 + floor
+    own = jac @ cov[:count, :count] @ jac.T * patch.unit_px**2 + floor_cov(corners, floor_px)
     return Fitted(corners * patch.unit_px + patch.middle_px, own, sigma / contrast, contrast,
                   abs(float(x[count + _BLUR])), float(x[-1]))  # fmt: skip
+
+
+def floor_cov(corners: Array, floor_px: float) -> Array:
+    """(8, 8) px^2, what is added to a fit's covariance in any case: each corner by itself, and all sides outward together.
+
+    Args:
+        corners: (4, 2) in units of half a side.
+        floor_px: see FLOOR_PX.
+    """
+    outward = (corners - corners.mean(axis=0)).ravel()
+    return np.asarray((np.eye(8) + np.outer(outward, outward)) * floor_px**2)
 
 
 def _corners(h: Array, bends: bool) -> Array | None:
