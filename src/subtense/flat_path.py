@@ -2,9 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Codes
+
+
+@dataclass(frozen=True)
+class Length:
+    """Arrays (...): the length along the path."""
+
+    length_m: Array
+    reason: Codes
+
+
+@dataclass(frozen=True)
+class Area:
+    """Arrays (...): the area, and the length of its outline."""
+
+    area_m2: Array
+    outline_m: Array
+    reason: Codes
+
+
+@dataclass(frozen=True)
+class Angle:
+    """Arrays (...): the angle at the corner, 0 to pi."""
+
+    angle_rad: Array
+    reason: Codes
 
 
 def path_length(places: Array, *, closed: bool = False) -> Array:

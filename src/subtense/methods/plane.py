@@ -18,7 +18,7 @@ import numpy as np
 from ..arrays import Array, Bools, Codes
 from ..camera import Camera
 from ..errors import InputError
-from ..flat_path import angle_between, crosses, enclosed_area, path_length
+from ..flat_path import Angle, Area, Length, angle_between, crosses, enclosed_area, path_length
 from ..flat_view import (
     ASSUMED,
     MOST_POINTS,
@@ -129,31 +129,6 @@ class Corner(Inputs):
         super().__post_init__()
         if self.path.points_px.shape[-2] != 3:
             raise InputError("path", f"{self.path.points_px.shape[-2]} points", "give three, the corner in the middle")
-
-
-@dataclass(frozen=True)
-class Length:
-    """Arrays (...): the length along the path."""
-
-    length_m: Array
-    reason: Codes
-
-
-@dataclass(frozen=True)
-class Area:
-    """Arrays (...): the area, and the length of its outline."""
-
-    area_m2: Array
-    outline_m: Array
-    reason: Codes
-
-
-@dataclass(frozen=True)
-class Angle:
-    """Arrays (...): the angle at the corner, 0 to pi."""
-
-    angle_rad: Array
-    reason: Codes
 
 
 @lru_cache(maxsize=8)

@@ -21,7 +21,7 @@ from ..arrays import Array, Codes
 from ..camera import Camera
 from ..conditions import KNOWN, WORDS, Condition, Conditions, read_conditions
 from ..errors import InputError
-from ..flat_path import angle_between, crosses, enclosed_area, path_length
+from ..flat_path import Angle, Area, Length, angle_between, crosses, enclosed_area, path_length
 from ..flat_view import ASSUMED, MOST_POINTS, Disc, straight_view, unknown_distortion
 from ..lenses import LENSES
 from ..method import Method, Output, Reason, reasons
@@ -162,31 +162,6 @@ def _check_enough(read: Conditions, *, camera: bool) -> None:
     fewer = "" if camera else f", or the camera too, with which {read.needed(camera=True)} are enough"
     raise InputError("conditions", f"{len(read.each)} of them",
                      f"give {needed} or more{fewer} (a rectangle counts as three, a square as four, each length as one)")  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Length:
-    """Arrays (...): the length along the path."""
-
-    length_m: Array
-    reason: Codes
-
-
-@dataclass(frozen=True)
-class Area:
-    """Arrays (...): the area, and the length of its outline."""
-
-    area_m2: Array
-    outline_m: Array
-    reason: Codes
-
-
-@dataclass(frozen=True)
-class Angle:
-    """Arrays (...): the angle at the corner, 0 to pi."""
-
-    angle_rad: Array
-    reason: Codes
 
 
 def _scene(inputs: Inputs, disc: Disc) -> Scene:
